@@ -15,7 +15,11 @@ from packaging.tags import platform_tags
 FOLDER = Path("jbeamshell", "contact_line")
 SOURCES = "walk.c", "slopes.c"
 LIBRARY = "libwalk.so"
-FLAGS = "-std=c11", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-fPIC"
+FLAGS = (
+    *("-std=c11", "-O3", "-fvisibility=hidden", "-shared", "-fPIC"),
+    "-ffp-contract=off",  # the same result on every processor
+    *("-fno-trapping-math", "-fno-math-errno"),  # else loops with choices have no vectors
+)
 COMPILERS = "cc", "gcc", "clang"
 
 

@@ -20,6 +20,7 @@ def in_double(function: Callable[P, R], within: Callable[P, R] | None = None) ->
     """Function that computes in double precision, and rounds if it is given single precision.
 
     Within a transformation the precision stays as it is, because JAX has one for a whole program.
+    Elsewhere what is rounded comes as arrays of NumPy.
 
     Parameters
     ----------
@@ -36,8 +37,7 @@ def in_double(function: Callable[P, R], within: Callable[P, R] | None = None) ->
             return function(*given, **options)
         with jax.enable_x64(True):
             found = jax.device_get(function(*doubled(given), **doubled(options)))
-        rounded: R = jax.tree.map(_rounded, found)
-        return rounded
+        return rounded(found)
 
     return precise
 
@@ -60,11 +60,14 @@ def _double(leaf: Any) -> Any:
     return np.asarray(leaf, np.float64) if floating else leaf
 
 
-def _rounded(leaf: Any) -> Any:
-    if not _is_array(leaf):
-        return leaf
-    # Rounded by NumPy and put as it is: JAX would compile a program for every shape.
-    return jax.device_put(leaf.astype(np.float32) if leaf.dtype == np.float64 else leaf)
+def rounded(tree: Any) -> Any:
+    """Pytree of NumPy with its double precision rounded to single precision."""
+    return jax.tree.map(_round, tree)
+
+
+def _round(leaf: Any) -> Any:
+    double = _is_array(leaf) and leaf.dtype == np.float64
+    return leaf.astype(np.float32) if double else leaf
 
 
 def _is_array(leaf: Any) -> bool:

@@ -13,17 +13,11 @@ import numpy as np
 from jbeamshell.common.checks import is_staged
 
 QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
-VECTORS = "xla_backend_optimization_level"  # option without which loops stay vectorised
 
 
 @functools.cache
-def quick_options(*, vectors: bool = False) -> dict[str, Any] | None:
+def quick_options() -> dict[str, Any] | None:
     """Compiler options for a small program: half the time to compile, the same time to run.
-
-    Parameters
-    ----------
-    vectors : True for a program of many lanes side by side: it compiles a sixth longer, and runs in
-        two thirds of the time
 
     Returns
     -------
@@ -34,8 +28,7 @@ def quick_options(*, vectors: bool = False) -> dict[str, Any] | None:
     config: Any = jax.config
     if config.values["jax_disable_most_optimizations"]:
         return None
-    wanted = {name: value for name, value in QUICK.items() if not (vectors and name == VECTORS)}
-    return {name: value for name, value in wanted.items() if _is_known(name, value)}
+    return {name: value for name, value in QUICK.items() if _is_known(name, value)}
 
 
 @functools.cache

@@ -8,11 +8,14 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array
 
+from jbeamshell.common.checks import is_traced
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.precision import rounded
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line.strip import Strip, moved_by
@@ -44,14 +47,23 @@ class Unread(Tree):
     ----------
     strip : strip on its contact line
     movement : its movement
+    single : True if the fields are rounded to single precision
     """
 
     strip: Strip
     movement: Movement
+    single: bool = eqx.field(static=True, default=False)
 
     @functools.cached_property
     def found(self) -> Above:
         """The fields; they are found once."""
+        if is_traced(self):
+            return self._found()
+        with jax.enable_x64(True):
+            above: Above = jax.device_get(self._found())
+        return rounded(above) if self.single else above
+
+    def _found(self) -> Above:
         above: Above = _above((self.strip, self.movement))
         return above
 

@@ -7,15 +7,17 @@ Poisson's ratio, stiffness, length or pressure as well, their bodies are interpo
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.apart import apart
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.precision import doubled
+from jbeamshell.common.threads import on_one_core
 from jbeamshell.contact_line.interpolation import (
     HEIGHT,
     POISSON,
@@ -39,6 +41,8 @@ OF_CONTACT = frozenset({*FIGURES, "dissipation_error", "force", "displacement", 
 USUAL_HEIGHTS = 0.02, 0.8  # that are interpolated where no range is known
 AROUND = 1.5  # times a scene's own height, which the range includes
 KEPT = 8  # shared strips that are kept
+
+R = TypeVar("R")
 
 
 class Layout(NamedTuple):
@@ -64,12 +68,13 @@ class Shared(NamedTuple):
 
     Attributes
     ----------
-    numbers : all numbers of a strip or of bodies, one array: few arrays are quick to hand over
+    numbers : all numbers of a strip or of bodies, one array on the processor: few arrays are quick
+        to hand over, and those of NumPy would be copied at each call
     layout : what they are
     heights : height ratios for which they hold; None for all
     """
 
-    numbers: np.ndarray
+    numbers: Array
     layout: Layout
     heights: Range | None
 
@@ -78,7 +83,7 @@ class Shared(NamedTuple):
         leaves, tree = jax.tree.flatten(strips)
         arrays = [np.asarray(leaf) for leaf in leaves]
         kinds = tuple((a.shape, "bool" if a.dtype == bool else "number") for a in arrays)
-        numbers = np.concatenate([a.ravel().astype(dtype) for a in arrays])
+        numbers = jax.device_put(np.concatenate([a.ravel().astype(dtype) for a in arrays]))
         return cls(numbers, Layout(tree, kinds), heights)
 
     def holds(self, scene: Scene, over: Sequence[str], values: Sequence[Any]) -> bool:
@@ -87,6 +92,22 @@ class Shared(NamedTuple):
             return True
         numbers = {key: float(value) for key, value in zip(over, values, strict=True)}
         return self.heights[0] <= float(scene.number(HEIGHT, numbers)) <= self.heights[1]
+
+
+def shares(
+    scene: Scene,
+    over: Sequence[str],
+    figures: Sequence[str],
+    ranges: Mapping[str, Range] | None = None,
+) -> bool:
+    """True if scenes that differ in some numbers share strips, see `shared`."""
+    if not scene.plan.on_contact_line or not OF_CONTACT.issuperset(figures) or is_traced(scene):
+        return False
+    vary = set(over)
+    if vary <= LOADS:
+        return scene.member.assembly != "frictional" or "contact.friction" not in vary
+    known = ranges is not None or POISSON not in vary
+    return known and may_be_interpolated(scene) and vary <= LOADS | SCALES | HEIGHTS | {POISSON}
 
 
 def shared(
@@ -104,18 +125,13 @@ def shared(
     figures : names of `jbeamshell.History` that are asked for
     ranges : least and most height ratio and Poisson's ratio, by key; None is not known
     """
-    if not scene.plan.on_contact_line or not OF_CONTACT.issuperset(figures) or is_traced(scene):
+    if not shares(scene, over, figures, ranges):
         return None
     vary, strip = set(over), scene.strip
     if vary <= LOADS:
-        rough = scene.member.assembly == "frictional" and "contact.friction" in vary
-        return None if rough else _of_one(*_numbers(scene))
-    nu, known = strip.poisson_ratio, ranges is not None or POISSON not in vary
-    if nu is None or not known or not may_be_interpolated(scene):
-        return None
-    if not vary <= LOADS | SCALES | HEIGHTS | {POISSON}:
-        return None
-    height, ratio = float(strip.height_ratio), float(nu)
+        return _of_one(*_numbers(scene))
+    assert strip.poisson_ratio is not None
+    height, ratio = float(strip.height_ratio), float(strip.poisson_ratio)
     usual = min(USUAL_HEIGHTS[0], height / AROUND), max(USUAL_HEIGHTS[1], height * AROUND)
     varies = vary & HEIGHTS or (strip.derives(HEIGHT) and "strip.length" in vary)
     ends = {HEIGHT: usual if varies else (height, height), POISSON: (ratio, ratio)}
@@ -135,15 +151,29 @@ def _scene(template: Template, numbers: bytes) -> Scene:
 
 @functools.lru_cache(KEPT)
 def _of_one(template: Template, numbers: bytes) -> Shared:
-    with jax.enable_x64(True), jax.ensure_compile_time_eval():
-        strip = jax.device_get(strip_of(_scene(template, numbers)).of_contact)
-    return Shared.of(strip, None, template.dtype)
+    def build() -> Shared:
+        return Shared.of(strip_of(_scene(template, numbers)).of_contact, None, template.dtype)
+
+    return _built(build)
 
 
 @functools.lru_cache(KEPT)
 def _interpolated(
     template: Template, numbers: bytes, heights: Range, poisson_ratios: Range
 ) -> Shared | None:
-    with jax.enable_x64(True), jax.ensure_compile_time_eval():
+    def build() -> Shared | None:
         bodies = built(_scene(template, numbers), heights, poisson_ratios)
-    return None if bodies is None else Shared.of(bodies, heights, template.dtype)
+        return None if bodies is None else Shared.of(bodies, heights, template.dtype)
+
+    return _built(build)
+
+
+def _built(build: Callable[[], R]) -> R:
+    """What a function builds in double precision, also while another function is traced."""
+
+    @on_one_core
+    def precise() -> R:
+        with jax.enable_x64(True):
+            return build()
+
+    return apart(precise)

@@ -48,15 +48,6 @@ typedef struct {
     int rounded;
 } Bench;
 
-static double dot(const double *R a, const double *R b, int m) {
-    double s[4] = {0.0, 0.0, 0.0, 0.0};
-    int r = 0;
-    for (; r + 4 <= m; r += 4)
-        for (int i = 0; i < 4; ++i) s[i] += a[r + i] * b[r + i];
-    for (; r < m; ++r) s[0] += a[r] * b[r];
-    return (s[0] + s[1]) + (s[2] + s[3]);
-}
-
 static void add(double *R a, double factor, const double *R b, int m) {
     for (int r = 0; r < m; ++r) a[r] += factor * b[r];
 }
@@ -89,7 +80,7 @@ static int extra_of(const Walk *w, const Event *e) {
 static void replay(Walk *w, const Part *part, Edges *g) {
     int k = w->k, m = w->m;
     w->now = &g->product;
-    g->product.known = 0, g->product.whole = 1;
+    g->product.whole = 1;
     begin(w);
     for (int e = 0; e < part->events; ++e) {
         const Event *event = &part->event[e];
@@ -123,7 +114,7 @@ static void combined(const Product *p, int count, int m, double *R c, double *R 
     memset(out, 0, m * sizeof(double)), memset(known, 0, m);
     for (int e = count - 1; e >= 0; --e) {
         int i = p->row[e], q = p->normal[e];
-        double value = dot(c, p->share + (size_t)e * m, m), own = c[i];
+        double value = dot(c, p->share[e], m), own = c[i];
         if (!known[i]) known[i] = 1, out[i] = value;
         c[q] += p->rest[e] * own;
         c[i] = -value;
@@ -597,7 +588,7 @@ static void bench_in(Room *room, Bench *z, int k, int n, size_t e, size_t v) {
     int m = k + n;
     Edges *g = &z->edges;
     Spline *s = &z->spline;
-    product_in(room, &g->product, (int)e + 2 * n, m);
+    product_in(room, &g->product, (int)e + 2 * n);
     g->length = WHOLES(e), g->found = REALS(e * m), g->rate = REALS(e * m), g->sigma = REALS(e * k);
     g->by_mu = REALS(e * k), g->reaction = REALS(e), g->slope = REALS(e), g->moves = FLAGS(e * m);
     g->along = REALS(v * m);

@@ -10,7 +10,7 @@ from jax import Array
 from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.common.failed import nan_unless
-from jbeamshell.common.precision import in_double, is_single
+from jbeamshell.common.precision import doubled, is_single, rounded
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line.above import Movement, Unread
 from jbeamshell.contact_line.bearings import bearing_energy, with_bearings, with_gaps
@@ -77,8 +77,17 @@ def solve(
         if the pressures lift the strip, or change along the path beside elastic sliders or a
         gap, or if loads act on a strip without a foundation
     """
-    now = is_traced(scene, path, strip) or is_staged() or is_single(scene)
-    return _solved(scene, path, cycles, own, strip, now)
+    if is_traced(scene, path, strip) or is_staged():
+        history, above = _solved(scene, path, cycles, own, strip)
+        return history.but(scene=scene, above=above.found)
+    single = is_single(scene)
+    with jax.enable_x64(True):
+        precise, loads = doubled(scene), doubled(path)
+        history, above = _solved(precise, loads, cycles, own, doubled(strip))
+        # Arrays of NumPy make figures and doubts ten times as quick as those of JAX.
+        history = jax.device_get(history)
+    history = rounded(history) if single else history
+    return history.but(scene=scene, above=above.but(single=single))
 
 
 def walks_pressures(scene: Scene) -> bool:
@@ -89,16 +98,10 @@ def walks_pressures(scene: Scene) -> bool:
     return scene.member.gap is None and scene.contact.stick_stiffness is None
 
 
-@in_double
 def _solved(
-    scene: Scene,
-    path: LoadPath,
-    cycles: Cycles,
-    own: bool,
-    strip: Strip | None,
-    now: bool,
-) -> History:
-    """History, whose fields above the contact are found now or when they are read."""
+    scene: Scene, path: LoadPath, cycles: Cycles, own: bool, strip: Strip | None
+) -> tuple[History, Unread]:
+    """History without its scene, and its fields above the contact, which nobody has read."""
     before = scene.load.pressure_steps
     targets, parts = path.target[before:], path.pressure[before:]
     whole = not is_traced(parts) and bool(np.all(np.asarray(parts) == 1.0))
@@ -119,9 +122,7 @@ def _solved(
     known_turns, traced = (turns, ()) if isinstance(turns, tuple) else ((), turns)
     inputs = same, strip, targets, None if whole else parts, traced
     history, movement = _walk(inputs, known_turns, cycles)
-    above = Unread(strip, movement)
-    history = history.but(scene=scene, above=above.found if now else above)
-    return history
+    return history, Unread(strip, movement)
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:

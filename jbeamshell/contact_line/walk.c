@@ -2,8 +2,8 @@
 
    The same walk as walk.py, polygon.py, events.py and spline.py, which explain it; names are theirs.
    One difference: no tableau is kept.  An event needs one of its columns, and that follows from the
-   column of the stiffness by the events before it (product form of the inverse).  Columns depend on
-   the events alone, so that branches of one sense share them as long as their events are the same.
+   column of the stiffness by the events before it (product form of the inverse).  A column depends on
+   the state of the contact alone, so that it is found once for all branches and loads of a body.
    A path has no global state and calls nothing but the C library.  Numbers are doubles. */
 
 #include <math.h>
@@ -24,11 +24,11 @@ void *take(Room *room, size_t bytes) {
     return found;
 }
 
-void product_in(Room *room, Product *p, int exchanges, int m) {
-    p->count = p->known = p->whole = 0, p->room = exchanges;
-    p->share = REALS((size_t)exchanges * m), p->add = REALS(exchanges), p->rest = REALS(exchanges);
-    p->pivot = REALS(exchanges), p->row = WHOLES(exchanges), p->normal = WHOLES(exchanges);
-    p->kind = WHOLES(exchanges);
+void product_in(Room *room, Product *p, int exchanges) {
+    p->count = p->whole = 0, p->room = exchanges;
+    p->share = take(room, (size_t)exchanges * sizeof(double *));
+    p->add = REALS(exchanges), p->rest = REALS(exchanges), p->pivot = REALS(exchanges);
+    p->row = WHOLES(exchanges), p->normal = WHOLES(exchanges);
 }
 
 Contact contact_in(Room *room, int k, int n) {
@@ -39,11 +39,67 @@ Contact contact_in(Room *room, int k, int n) {
     return c;
 }
 
+/* Sum of products in eight parts, which processors add side by side. */
+double dot(const double *R a, const double *R b, int m) {
+    double s[8] = {0.0};
+    int r = 0;
+    for (; r + 8 <= m; r += 8)
+        for (int i = 0; i < 8; ++i) s[i] += a[r + i] * b[r + i];
+    for (; r < m; ++r) s[0] += a[r] * b[r];
+    return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
+}
+
+/* --- columns ----------------------------------------------------------------------------------- */
+
+static uint64_t mixed(uint64_t x) { /* the last step of splitmix64 */
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
+/* Puts a number into a key; the second time takes it out again. */
+static void mark(Key *key, uint64_t number) {
+    key->a ^= mixed(number + 0x9e3779b97f4a7c15u), key->b ^= mixed(number + 0x3c6ef372fe94f82au);
+}
+
+static void mark_node(Key *state, int node, double sigma, double open) {
+    int now = (sigma > 0.0 ? 1 : sigma < 0.0 ? 2 : 0) + (open != 0.0 ? 3 : 0);
+    if (now > 0) mark(state, 6 * (uint64_t)node + (uint64_t)now);
+}
+
+static void forget_columns(Columns *c) { ++c->now, c->used = c->kept = 0; }
+
+/* Room for a column and its pivot. */
+static double *new_column(Columns *c) {
+    int place = c->used / BLOCK;
+    if (place == c->blocks) {
+        double **more = realloc(c->block, ((size_t)place + 1) * sizeof *more);
+        double *block = more == NULL ? NULL : malloc(BLOCK * ((size_t)c->m + 1) * sizeof(double));
+        if (more != NULL) c->block = more;
+        if (block == NULL) {
+            c->failed = 1;
+            return c->spare;
+        }
+        c->block[place] = block, ++c->blocks;
+    }
+    return c->block[place] + (size_t)(c->used++ % BLOCK) * ((size_t)c->m + 1);
+}
+
+/* Place of a key in the table, empty if it is new; null where the table is full. */
+static double **place_of(Columns *c, Key key) {
+    size_t i = key.a % TABLE;
+    for (; c->since[i] == c->now; i = (i + 1) % TABLE)
+        if (c->key[i].a == key.a && c->key[i].b == key.b) return &c->column[i];
+    if (c->kept == c->most) return NULL;
+    ++c->kept, c->since[i] = c->now, c->key[i] = key, c->column[i] = NULL;
+    return &c->column[i];
+}
+
 /* --- product form of the inverse --------------------------------------------------------------- */
 
 /* A vector after an exchange. */
 void exchanged(const Product *p, int e, int m, double *R a) {
-    const double *R share = p->share + (size_t)e * m;
+    const double *R share = p->share[e];
     int i = p->row[e], q = p->normal[e];
     double entry = a[i] + p->add[e] * a[q];
     if (entry != 0.0)
@@ -55,65 +111,75 @@ void exchanged(const Product *p, int e, int m, double *R a) {
 static void column(const double *K, const Product *p, int m, int j, double *R a) {
     int e = p->count - 1;
     while (e >= 0 && p->row[e] != j) --e; /* the last exchange that made this column */
-    memcpy(a, e < 0 ? K + (size_t)j * m : p->share + (size_t)e * m, m * sizeof(double));
+    memcpy(a, e < 0 ? K + (size_t)j * m : p->share[e], m * sizeof(double));
     for (++e; e < p->count; ++e) exchanged(p, e, m, a);
+}
+
+/* Adds the exchange of an event to the product form. */
+static void add_exchange(Walk *w, Key state, int kind, int node) {
+    Product *p = w->now;
+    int m = w->m, q = w->k + node, i = kind < OPEN ? node : q, e = p->count;
+    double add = kind == ALONG ? w->mu : kind == AGAINST ? -w->mu : 0.0;
+    double rest = kind == STICK ? -w->sigma[node] * w->mu : 0.0;
+    mark(&state, ((uint64_t)1 << 40) + KINDS * (uint64_t)node + (uint64_t)kind);
+    double *own = NULL, **found = place_of(w->columns, state);
+    if (found == NULL) found = &own;
+    if (*found == NULL) {
+        double *share = *found = new_column(w->columns);
+        column(w->K, p, m, i, w->column);
+        double pivot = w->column[i] + add * w->column[q];
+        for (int r = 0; r < m; ++r) share[r] = w->column[r] / pivot;
+        share[i] = 1.0 / pivot + (rest != 0.0 ? rest * share[q] : 0.0);
+        share[m] = pivot;
+    }
+    p->share[e] = *found, p->pivot[e] = (*found)[m];
+    p->row[e] = i, p->normal[e] = q, p->add[e] = add, p->rest[e] = rest;
+    p->count = e + 1;
 }
 
 /* --- tableau ----------------------------------------------------------------------------------- */
 
 /* Product form anew, of the nodes that slip and that are open. */
 static void rebuild(Walk *w) {
-    Product *p = w->now;
-    p->count = p->known = 0;
-    for (int pass = 0; pass < 2; ++pass)
-        for (int i = 0; i < w->n; ++i) {
-            int slips = pass == 0 && i < w->k && w->sigma[i] != 0.0;
-            if (!slips && !(pass == 1 && w->open[i])) continue;
-            int q = w->k + i, row = slips ? i : q, e = p->count, m = w->m;
-            double *share = p->share + (size_t)e * m, add = slips ? w->sigma[i] * w->mu : 0.0;
-            column(w->K, p, m, row, w->column);
-            double pivot = w->column[row] + add * w->column[q];
-            for (int r = 0; r < m; ++r) share[r] = w->column[r] / pivot;
-            share[row] = 1.0 / pivot;
-            p->row[e] = row, p->normal[e] = q, p->add[e] = add, p->rest[e] = 0.0, p->pivot[e] = pivot;
-            p->kind[e] = !slips ? OPEN : add > 0.0 ? ALONG : AGAINST;
-            p->count = p->known = e + 1;
+    Key state = {0, 0};
+    w->now->count = 0;
+    for (int i = 0; i < w->k; ++i)
+        if (w->sigma[i] != 0.0) {
+            add_exchange(w, state, w->sigma[i] > 0.0 ? ALONG : AGAINST, i);
+            mark_node(&state, i, w->sigma[i], 0.0);
+        }
+    for (int i = 0; i < w->n; ++i)
+        if (w->open[i] != 0.0) {
+            add_exchange(w, state, OPEN, i);
+            mark_node(&state, i, w->sigma[i], 0.0), mark_node(&state, i, w->sigma[i], 1.0);
         }
 }
 
 void change_contact(Walk *w, int kind, int node, int keeps) {
     Product *p = w->now;
     if (p->count == p->room) rebuild(w);
-    int m = w->m, k = w->k, q = k + node, i = kind < OPEN ? node : q, e = p->count;
-    if (!(e < p->known && p->kind[e] == kind && p->row[e] == i)) {
-        double *share = p->share + (size_t)e * m;
-        double add = kind == ALONG ? w->mu : kind == AGAINST ? -w->mu : 0.0;
-        double rest = kind == STICK ? -w->sigma[node] * w->mu : 0.0;
-        column(w->K, p, m, i, w->column);
-        double pivot = w->column[i] + add * w->column[q];
-        for (int r = 0; r < m; ++r) share[r] = w->column[r] / pivot;
-        share[i] = 1.0 / pivot + (rest != 0.0 ? rest * share[q] : 0.0);
-        p->row[e] = i, p->normal[e] = q, p->add[e] = add, p->rest[e] = rest, p->pivot[e] = pivot;
-        p->kind[e] = kind;
-        p->known = e + 1;
-    }
-    exchanged(p, e, m, w->rate);
+    int e = p->count, q = w->k + node, i = kind < OPEN ? node : q;
+    add_exchange(w, w->state, kind, node);
+    exchanged(p, e, w->m, w->rate);
     /* An event that undoes the one before leaves what was before both. */
     int undoes = !p->whole && e > 0 && p->row[e - 1] == i && p->add[e - 1] == -p->rest[e] && p->rest[e - 1] == -p->add[e];
-    p->count = undoes ? e - 1 : e + 1;
+    if (undoes) p->count = e - 1;
 
     double answer = w->answer[i] + p->add[e] * w->answer[q];
     w->answer[i] = w->held[i] + (p->rest[e] != 0.0 ? p->rest[e] * w->answer[q] : 0.0);
     w->held[i] = kind <= STICK || keeps ? answer : kind == CLOSE ? -w->lift[node] : 0.0;
+    mark_node(&w->state, node, w->sigma[node], w->open[node]);
     if (kind < OPEN) w->sigma[node] = kind == ALONG ? 1.0 : kind == AGAINST ? -1.0 : 0.0;
-    else w->open[node] = kind == OPEN;
+    else w->open[node] = kind == OPEN ? 1.0 : 0.0;
+    mark_node(&w->state, node, w->sigma[node], w->open[node]);
 }
 
 void begin(Walk *w) {
+    if (w->columns->kept == w->columns->most) forget_columns(w->columns);
     memcpy(w->answer, w->r_0, w->m * sizeof(double));
     for (int r = 0; r < w->m; ++r) w->rate[r] = -w->pull[r], w->held[r] = 0.0;
-    for (int i = 0; i < w->n; ++i) w->sigma[i] = 0.0, w->open[i] = 0;
-    w->tau = 0.0, w->now->count = 0;
+    for (int i = 0; i < w->n; ++i) w->sigma[i] = w->open[i] = 0.0;
+    w->tau = 0.0, w->now->count = 0, w->state = (Key){0, 0};
     for (int i = 0; i < w->n; ++i)
         if (w->lifted[i]) {
             if (i < w->k) change_contact(w, w->answer[i] > 0.0 ? AGAINST : ALONG, i, 1);
@@ -121,7 +187,7 @@ void begin(Walk *w) {
         }
 }
 
-int moves(const Walk *w, int r) { return r < w->k ? w->sigma[r] != 0.0 : w->open[r - w->k]; }
+int moves(const Walk *w, int r) { return r < w->k ? w->sigma[r] != 0.0 : w->open[r - w->k] != 0.0; }
 
 void advance(Walk *w, double tau) {
     double step = tau - w->tau;
@@ -131,8 +197,53 @@ void advance(Walk *w, double tau) {
 
 /* --- events ------------------------------------------------------------------------------------ */
 
+/* The waits of all nodes are found side by side, without branches; the events of the node that waits
+   least are then gone through one by one, because those at one load have an order. */
+
 static double until(double room, double change) {
-    return change < 0.0 ? fmax(room, 0.0) / -change : INFINITY;
+    double some = room > 0.0 ? room : 0.0, size = change < 0.0 ? -change : 1.0, wait = some / size;
+    return change < 0.0 ? wait : INFINITY;
+}
+
+/* Wait of a node that sticks for its slip to one side: with more friction than its own, unless that
+   lasts until the branch has gone back for as long as the one before. */
+static double slips_after(double room, double more, double change, double rest) {
+    double wait = until(room + more, change), own = until(room, change);
+    double late = own > rest ? own : rest;
+    return wait >= rest ? late : wait;
+}
+
+static inline void find_waits(const Walk *w, double rest, int returns) {
+    int k = w->k;
+    double mu = w->mu, *R wait = w->wait;
+    const double *R force = w->answer, *R normal = w->answer + k, *R slip = w->rate, *R fall = w->rate + k;
+    const double *R held = w->held + k, *R lift = w->lift, *R sigma = w->sigma, *R open = w->open;
+    const double *R along = w->extra, *R against = w->extra + k;
+    for (int i = 0; i < k; ++i) {
+        double up = mu * fall[i] + slip[i], down = mu * fall[i] - slip[i];
+        double room_up = mu * normal[i] + force[i], room_down = mu * normal[i] - force[i];
+        double a = returns ? slips_after(room_up, along[i], up, rest) : until(room_up + along[i], up);
+        double b = returns ? slips_after(room_down, against[i], down, rest) : until(room_down + against[i], down);
+        double stuck = a < b ? a : b, apart = open[i] * lift[i] + normal[i], moving = until(apart, fall[i]);
+        double turns = sigma[i] * slip[i] < 0.0 ? 0.0 : moving, rises = fall[i] > 0.0 ? 0.0 : moving;
+        double opened = held[i] > 0.0 ? rises : moving, slipping = sigma[i] != 0.0 ? turns : stuck;
+        wait[i] = open[i] != 0.0 ? opened : slipping;
+    }
+    for (int i = k; i < w->n; ++i) {
+        int rises = held[i] > 0.0 && fall[i] > 0.0;
+        wait[i] = open[i] == 0.0 ? until(normal[i], fall[i]) : rises ? 0.0 : until(lift[i] + normal[i], fall[i]);
+    }
+}
+
+static double least_of(const double *R a, int count) {
+    double s[8];
+    int i = 0;
+    for (int j = 0; j < 8; ++j) s[j] = INFINITY;
+    for (; i + 8 <= count; i += 8)
+        for (int j = 0; j < 8; ++j) s[j] = a[i + j] < s[j] ? a[i + j] : s[j];
+    for (; i < count; ++i) s[0] = a[i] < s[0] ? a[i] : s[0];
+    for (int j = 1; j < 8; ++j) s[0] = s[j] < s[0] ? s[j] : s[0];
+    return s[0];
 }
 
 /* Takes an event that comes after a wait, ``tau`` of the best, if it is earlier. */
@@ -142,32 +253,42 @@ static void earlier(Event *best, double wait, int kind, int node, int cause) {
     if (first) best->tau = wait, best->kind = kind, best->node = node, best->cause = cause;
 }
 
+/* True if so little friction is left that the node slips at once. */
+static int is_late(const Walk *w, double room) {
+    double most = 0.0;
+    for (int i = 0; i < w->k && room < 0.0; ++i) most = fmax(most, w->mu * w->answer[w->k + i]);
+    return room < -LATE * most;
+}
+
+static void events_of(const Walk *w, int i, double rest, Event *best) {
+    int k = w->k;
+    double normal = w->answer[k + i], fall = w->rate[k + i];
+    if (w->open[i] != 0.0) {
+        if (w->held[k + i] > 0.0 && fall > 0.0) earlier(best, 0.0, CLOSE, i, AT_ONCE);
+        else earlier(best, until(w->lift[i] + normal, fall), CLOSE, i, BY_ROW);
+    } else if (i >= k || w->sigma[i] != 0.0) {
+        if (i < k && w->sigma[i] * w->rate[i] < 0.0) earlier(best, 0.0, STICK, i, AT_ONCE);
+        earlier(best, until(normal, fall), OPEN, i, BY_ROW);
+    } else
+        for (int kind = ALONG; kind <= AGAINST; ++kind) {
+            double side = kind == ALONG ? 1.0 : -1.0, more = w->extra[kind * k + i];
+            double change = w->mu * fall + side * w->rate[i];
+            if (change >= 0.0) continue;
+            double room = w->mu * normal + side * w->answer[i];
+            int ends = until(room + more, change) >= rest, comes = ends && until(room, change) < rest;
+            int cause = comes ? AT_RETURN : is_late(w, ends ? room : room + more) ? AT_ONCE : BY_ROW;
+            earlier(best, slips_after(room, more, change, rest), kind, i, cause);
+        }
+}
+
 static Event next_event(const Walk *w) {
-    int k = w->k, n = w->n;
-    const double *R normal = w->answer + k, *R fall = w->rate + k;
-    double most = 0.0, rest = w->back - w->tau;
-    for (int i = 0; i < k; ++i) most = fmax(most, w->mu * normal[i]);
-    Event best = {INFINITY, KINDS, n, FIXED, 0, 0};
-    for (int i = 0; i < n; ++i) {
-        if (w->open[i]) {
-            int rises = w->held[k + i] > 0.0 && fall[i] > 0.0;
-            if (rises) earlier(&best, 0.0, CLOSE, i, AT_ONCE);
-            else earlier(&best, until(w->lift[i] + normal[i], fall[i]), CLOSE, i, BY_ROW);
-        } else if (i >= k || w->sigma[i] != 0.0) {
-            if (i < k && w->sigma[i] * w->rate[i] < 0.0) earlier(&best, 0.0, STICK, i, AT_ONCE);
-            earlier(&best, until(normal[i], fall[i]), OPEN, i, BY_ROW);
-        } else
-            for (int kind = ALONG; kind <= AGAINST; ++kind) {
-                double side = kind == ALONG ? 1.0 : -1.0, more = w->extra[kind * k + i];
-                double change = w->mu * fall[i] + side * w->rate[i];
-                if (change >= 0.0) continue;
-                double room = w->mu * normal[i] + side * w->answer[i];
-                double wait = until(room + more, change), own = until(room, change);
-                int ends = wait >= rest, late = (ends ? room : room + more) < -LATE * most;
-                int cause = ends && own < rest ? AT_RETURN : late ? AT_ONCE : BY_ROW;
-                earlier(&best, ends ? fmax(own, rest) : wait, kind, i, cause);
-            }
-    }
+    double rest = w->back - w->tau;
+    Event best = {INFINITY, KINDS, w->n, FIXED, 0, 0};
+    if (rest < INFINITY) find_waits(w, rest, 1);
+    else find_waits(w, rest, 0);
+    double least = least_of(w->wait, w->n);
+    for (int i = 0; i < w->n && least < INFINITY; ++i)
+        if (w->wait[i] == least) events_of(w, i, rest, &best);
     best.tau += w->tau;
     return best;
 }
@@ -175,13 +296,19 @@ static Event next_event(const Walk *w) {
 /* --- polygon ----------------------------------------------------------------------------------- */
 
 static void set_vertex(Walk *w, int place) {
-    int m = w->m, k = w->k;
-    double *R change = w->change + (size_t)place * m, *R force = w->force + (size_t)place * m;
+    int m = w->m, k = w->k, n = w->n;
+    double *R slip = w->change + (size_t)place * m, *R rise = slip + k, mu = w->mu;
+    double *R force = w->force + (size_t)place * m, *R normal = force + k;
+    const double *R answer = w->answer, *R held = w->held, *R sigma = w->sigma, *R open = w->open;
     w->at[place] = w->tau;
-    for (int r = 0; r < m; ++r) change[r] = moves(w, r) ? w->answer[r] : w->held[r];
-    for (int i = 0; i < w->n; ++i) force[k + i] = w->open[i] ? w->held[k + i] : w->answer[k + i];
-    for (int i = 0; i < k; ++i)
-        force[i] = w->sigma[i] == 0.0 ? w->answer[i] : w->held[i] - w->sigma[i] * w->mu * force[k + i];
+    for (int i = 0; i < n; ++i) {
+        double a = answer[k + i], b = held[k + i];
+        rise[i] = open[i] != 0.0 ? a : b, normal[i] = open[i] != 0.0 ? b : a;
+    }
+    for (int i = 0; i < k; ++i) {
+        double a = answer[i], b = held[i], limit = b - sigma[i] * mu * normal[i];
+        slip[i] = sigma[i] != 0.0 ? a : b, force[i] = sigma[i] != 0.0 ? limit : a;
+    }
 }
 
 static int with_vertex(Walk *w, double reach) {
@@ -273,7 +400,7 @@ static void polygon(Walk *w, double reach) {
         w->stuck[i] = 0, w->opened[i] = w->lifted[i];
     }
     Event event = next_event(w);
-    while (event.tau <= horizon(w, reach) && events < most - 1 && w->number < w->vertices - 2 &&
+    while ((event.tau <= reach || event.tau <= horizon(w, reach)) && events < most - 1 && w->number < w->vertices - 2 &&
            !(w->tau >= reach && velocity(w) > SLIDES_ON * w->slides)) {
         advance(w, event.tau);
         int keep = event.kind == CLOSE && w->rate[k + event.node] > 0.0;
@@ -284,7 +411,7 @@ static void polygon(Walk *w, double reach) {
         with_slip(w, &event, vertex, reach);
         event = next_event(w), ++events;
     }
-    w->ended = event.tau > reach || w->tau >= reach;
+    w->ended = (event.tau > reach || w->tau >= reach) && !w->columns->failed;
     /* A vertex at the next event, or anywhere beyond, ends the last edge. */
     double reached = fmax(reach, w->tau), anywhere = reached > 0.0 ? 2.0 * reached : 1.0;
     int comes = event.tau - w->tau > MERGED * reached && event.tau < anywhere, place = w->number++;
@@ -300,11 +427,7 @@ static void polygon(Walk *w, double reach) {
 /* Corners where the body slides as a whole stay sharp; sums for the work of friction. */
 static void prepare(Walk *w) {
     int m = w->m, last = w->number - 1;
-    for (int j = 0; j <= last; ++j) {
-        double sum = 0.0;
-        for (int r = 0; r < m; ++r) sum += w->change[(size_t)j * m + r] * w->pull[r];
-        w->pulled[j] = sum;
-    }
+    for (int j = 0; j <= last; ++j) w->pulled[j] = dot(w->change + (size_t)j * m, w->pull, m);
     w->whole[0] = 0.0, w->rise[last] = 0.0, w->sliding[last] = 0;
     for (int j = 0; j < last; ++j) {
         double step = w->at[j + 1] - w->at[j];
@@ -402,11 +525,7 @@ static Reading read_at(const Walk *w, double tau, double *R change, double *R fo
             force[r] += ahead * (f[r + m] - f[r]) - behind * (f[r] - f[r - m]);
         }
     }
-    double moved = 0.0, stored = 0.0;
-    for (int r = 0; r < m; ++r) {
-        moved += change[r] * w->pull[r];
-        stored += 0.5 * change[r] * (w->r_0[r] + force[r]);
-    }
+    double moved = dot(change, w->pull, m), stored = 0.5 * (dot(change, w->r_0, m) + dot(change, force, m));
     return (Reading){edge, w->sliding[edge], 0.5 * tau * moved - under - stored};
 }
 
@@ -439,7 +558,7 @@ static Course depart(Walk *w, const Contact *from, const double *f, double targe
     for (int r = 0; r < m; ++r) w->pull[r] = course.sense * f[r];
     memcpy(w->r_0, from->r, m * sizeof(double));
     memcpy(w->lift, from->lift, n * sizeof(double));
-    w->now = &w->product[course.sense < 0.0];
+    w->now = &w->product;
     w->back = course.first ? from->length : INFINITY;
     memset(w->extra, 0, 2 * k * sizeof(double));
     if (rounded && course.again)
@@ -458,11 +577,11 @@ static Course depart(Walk *w, const Contact *from, const double *f, double targe
 /* Level of a course at a load: contact in ``at``, and work since it began. */
 double level(const Walk *w, const Contact *from, const Course *course, double load, double *change, Contact *at, unsigned char *slipping) {
     int k = w->k, m = w->m, n = w->n;
-    double tau = course->sense * (load - from->load), most = 0.0, moved = 0.0;
+    double tau = course->sense * (load - from->load), most = 0.0;
     Reading read = read_at(w, tau, change, at->r);
     for (int i = 0; i < n; ++i) at->lift[i] = from->lift[i] + change[k + i];
     for (int i = k; i < m; ++i) most = fmax(most, at->r[i]);
-    for (int r = 0; r < m; ++r) moved += change[r] * w->pull[r];
+    double moved = dot(change, w->pull, m);
     /* Rounding leaves open nodes a little force: the shorter the elements, the more. */
     for (int i = 0; i < n; ++i) {
         int q = k + i;
@@ -587,10 +706,10 @@ static void path(Walk *w, Contact *from, Contact *to, const double *f, int level
 
 static void walk_in(Room *room, Walk *w) {
     int n = w->n, k = w->k, m = w->m, v = w->vertices;
-    for (int i = 0; i < 2; ++i) product_in(room, &w->product[i], PRODUCT * n, m);
+    product_in(room, &w->product, PRODUCT * n);
     w->r_0 = REALS(m), w->lift = REALS(n), w->pull = REALS(m), w->extra = REALS(2 * k);
     w->answer = REALS(m), w->rate = REALS(m), w->held = REALS(m), w->sigma = REALS(n);
-    w->open = FLAGS(n), w->lifted = FLAGS(n), w->column = REALS(m);
+    w->open = REALS(n), w->wait = REALS(n), w->lifted = FLAGS(n), w->column = REALS(m);
     w->before = WHOLES(v), w->after = WHOLES(v), w->node = WHOLES(v), w->last = WHOLES(KINDS * n);
     w->way = FLAGS(v), w->at = REALS(v), w->change = REALS((size_t)v * m), w->force = REALS((size_t)v * m);
     w->pulled = REALS(v), w->rise = REALS(v), w->whole = REALS(v), w->part_before = REALS(v);
@@ -606,22 +725,35 @@ static double slides(const double *K, const double *f, double c, int m) {
     return SLIDES * (fabs(c) + square / (whole > 0.0 ? whole : 1.0));
 }
 
-void close_desk(Desk *desk) { free(desk->memory); }
+static void columns_in(Room *room, Columns *c, int m) {
+    c->since = take(room, TABLE * sizeof(unsigned)), c->key = take(room, TABLE * sizeof(Key));
+    c->column = take(room, TABLE * sizeof(double *)), c->spare = REALS(m + 1);
+}
+
+void close_desk(Desk *desk) {
+    for (int i = 0; i < desk->columns.blocks; ++i) free(desk->columns.block[i]);
+    free(desk->columns.block), free(desk->memory);
+    desk->columns.blocks = 0, desk->columns.block = NULL, desk->memory = NULL;
+}
 
 int open_desk(Desk *desk, int k, int n, int places) {
     Room whole = {NULL, 0}, *room = &whole;
     Walk *w = &desk->walk;
+    int reals = MOST_REALS / (k + n + 1);
     desk->memory = NULL;
+    desk->columns = (Columns){.m = k + n, .most = reals < TABLE / 2 ? reals : TABLE / 2, .now = 1};
     w->n = n, w->k = k, w->m = k + n, w->places = places, w->vertices = MOST_VERTICES * n;
-    w->tape = NULL;
+    w->tape = NULL, w->columns = &desk->columns;
     for (int pass = 0; pass < 2; ++pass) { /* counts first, and then takes */
         walk_in(room, w);
+        columns_in(room, &desk->columns, k + n);
         for (int i = 0; i < 3; ++i) desk->contacts[i] = contact_in(room, k, n);
         desk->change = REALS(k + n), desk->flags = FLAGS(k);
         if (pass == 0) whole.at = malloc(whole.used), whole.used = 0;
         if (whole.at == NULL) return 0;
     }
     desk->memory = whole.at;
+    memset(desk->columns.since, 0, TABLE * sizeof(unsigned));
     return 1;
 }
 
@@ -629,7 +761,7 @@ void run(Desk *desk, const Given *given, int same_body, int levels, Levels out) 
     Walk *w = &desk->walk;
     int k = w->k, n = w->n, m = w->m;
     Contact *from = &desk->contacts[0];
-    if (!same_body) w->product[0].known = w->product[1].known = 0;
+    if (!same_body) forget_columns(&desk->columns);
     w->K = given->K, w->x = given->x, w->mu = *given->mu, w->c = *given->c;
     w->slides = slides(given->K, given->f, w->c, m);
     memcpy(from->v, given->v, k * sizeof(double)), memcpy(from->r, given->r, m * sizeof(double));

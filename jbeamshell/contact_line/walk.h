@@ -10,11 +10,25 @@ enum { MOST_VERTICES = 8, MOST_EVENTS = 40, DENSE = 3, PRODUCT = 3 }; /* times t
 
 static const double MOST_PART = 0.6, UNEVEN = 3.0, STARTS = 0.25;
 
-/* Exchanges of rows and columns; those from count on are remembered, and may come again. */
+/* State of a contact, or an event in it: as good as no two have one key. */
+typedef struct { uint64_t a, b; } Key;
+
+/* Columns of a tableau over their pivots, with the pivot behind each.  They depend on the state of
+   the contact and on the event alone, so that branches, cycles and loads of one body share them.
+   The first ones have a place in a table; those of ``now`` are of this body. */
+enum { TABLE = 1 << 13, BLOCK = 64, MOST_REALS = 1 << 21 };
 typedef struct {
-    int count, known, room, whole;      /* whole: those that undo each other stay, too */
-    double *share, *add, *rest, *pivot; /* share (room, m) */
-    int *row, *normal, *kind;
+    int m, blocks, used, kept, most, failed;
+    unsigned now, *since;
+    Key *key;
+    double **column, **block, *spare;
+} Columns;
+
+/* Exchanges of rows and columns. */
+typedef struct {
+    int count, room, whole;              /* whole: those that undo each other stay, too */
+    double **share, *add, *rest, *pivot; /* share: (m,) each */
+    int *row, *normal;
 } Product;
 
 /* Contact where a branch begins, and what it remembers; see walk.py. */
@@ -53,11 +67,14 @@ typedef struct {
     int places;                        /* nodes with a position: bearings have none */
     const double *K, *x;               /* (m, m) symmetric, (places,) */
     double mu, c, slides;
-    Product product[2], *now;          /* one for each sense of the load */
+    Product product, *now;
+    Columns *columns;
+    Key state;
     /* branch: equations, tableau */
     double *r_0, *lift, *pull, *extra; /* (m,), (n,), (m,), (2, k) */
-    double *answer, *rate, *held, *sigma, back, tau;
-    unsigned char *open, *lifted;      /* (n,) open now, and where the branch begins */
+    double *answer, *rate, *held, *sigma, *open, back, tau; /* open (n,): 1 or 0 */
+    double *wait;                      /* (n,) for the next event of each node */
+    unsigned char *lifted;             /* (n,) open where the branch begins */
     /* polygon */
     int number, *before, *after, *node, *last; /* last (KINDS, n) */
     unsigned char *way;
@@ -83,6 +100,7 @@ typedef struct {
 /* Room for paths of n nodes, of which k may slip; without memory opening it fails. */
 typedef struct {
     Walk walk;
+    Columns columns;
     Contact contacts[3];
     double *change;
     unsigned char *flags;
@@ -101,6 +119,7 @@ typedef struct { int counts, inside; double value, load, before, behind, area, a
 /* Memory in pieces: its bytes are counted first, with no memory, and then taken. */
 typedef struct { char *at; size_t used; } Room;
 
+double dot(const double *R a, const double *R b, int m);
 void *take(Room *room, size_t bytes);
 #define REALS(count) take(room, (size_t)(count) * sizeof(double))
 #define WHOLES(count) take(room, (size_t)(count) * sizeof(int))
@@ -108,7 +127,7 @@ void *take(Room *room, size_t bytes);
 
 Contact contact_in(Room *room, int k, int n);
 int open_desk(Desk *desk, int k, int n, int places);
-void product_in(Room *room, Product *p, int exchanges, int m);
+void product_in(Room *room, Product *p, int exchanges);
 void close_desk(Desk *desk);
 Given given_of(Buffer **in, int64_t lane, const Buffer *first, int64_t *numbers);
 void run(Desk *desk, const Given *given, int same_body, int levels, Levels out);

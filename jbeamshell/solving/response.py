@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import inspect
 from collections.abc import Callable, Sequence
@@ -13,7 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import check_words, is_staged, is_traced, require, require_choice
+from jbeamshell.common.apart import apart
+from jbeamshell.common.checks import check_words, is_traced, require, require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.precision import doubled, in_double, is_single
 from jbeamshell.common.small import Small
@@ -164,28 +164,28 @@ def _programs(template: Template, asked: _Asked, layout: Layout | None = None) -
     With a layout the numbers of shared strips come before the values.
     """
     over, solver = asked.over, asked.solver
-    apart = 0 if layout is None else 1
+    first = 0 if layout is None else 1
 
     @Small
     def figures_of(given: tuple[Any, ...]) -> dict[str, Array]:
         fixed, *further = given
-        values = dict(zip(over, further[apart:], strict=True))
+        values = dict(zip(over, further[first:], strict=True))
         varied = template.scene(list(fixed)).replace(values)
         strip = None if layout is None else layout.strip(further[0], varied)
         return figures(varied, asked.figures, strip, solver)
 
     @on_one_core
     def now(given: tuple[Any, ...]) -> dict[str, Array]:
-        # While another function is traced, numbers would become a part of its program.  Elsewhere
-        # each operation on constants would be compiled and run by itself.
-        with jax.ensure_compile_time_eval() if is_staged() else contextlib.nullcontext():
-            found: dict[str, Array] = jax.block_until_ready(figures_of(given))
+        found: dict[str, Array] = jax.block_until_ready(figures_of(given))
         return found
 
     def ask(*given: Any) -> dict[str, Array]:
         arrays = jax.tree.map(lambda a: a if isinstance(a, Array) else np.asarray(a), given)
-        found: dict[str, Array] = figures_of(arrays) if is_traced(arrays) else now(arrays)
-        return found
+        if is_traced(arrays):
+            found: dict[str, Array] = figures_of(arrays)
+            return found
+        # While another function is traced, numbers would become a part of its program.
+        return apart(lambda: now(arrays))
 
     return ask
 

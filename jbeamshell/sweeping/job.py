@@ -15,16 +15,16 @@ import numpy as np
 from jbeamshell.common.arrays import check_sum
 from jbeamshell.common.errors import InputError
 from jbeamshell.contact_line.interpolation import HEIGHT, POISSON
+from jbeamshell.contact_line.shared import shares
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
-from jbeamshell.sweeping.runner import BLOCK, Block, Runner, shared_keys, width_of_chunks
+from jbeamshell.sweeping.runner import BLOCK, Block, Chunks, Runner, chunks_of, shared_keys
 
 BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
 LEAST = 8  # least lanes of a block that is worth a file
 MANY_BODIES = 32  # lanes from which on interpolated bodies are quicker than bodies of their own
-MANY = 10_000  # lanes from which on seconds of compilation are worth it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Job:
         """
         inside = np.flatnonzero(~self.outside)
         order = inside[np.argsort(self._rank[inside], kind="stable")]
-        width = self.width
+        width = self.chunks.width
         chunks = -(-order.size // width)
         least = -(-LEAST // width)
         largest = min(max(-(-chunks // BLOCKS), least), BLOCK // width)
@@ -83,15 +83,12 @@ class Job:
         return [order[n[n < order.size]] for n in numbers]
 
     @functools.cached_property
-    def width(self) -> int:
-        """Number of lanes that advance together."""
+    def chunks(self) -> Chunks:
+        """Chunks of lanes that advance together."""
         inside = self._body[~self.outside.ravel()]
-        return width_of_chunks(self.lanes.scene, np.unique(inside, return_counts=True)[1])
-
-    @property
-    def many(self) -> bool:
-        """True if a program that takes longer to compile, and less to run, pays."""
-        return self.lanes.size > MANY
+        scene, keys, ranges = self.lanes.scene, tuple(self.lanes.axes), self.ranges
+        together = ranges is not None and shares(scene, keys, self.figures, ranges)
+        return chunks_of(scene, np.unique(inside, return_counts=True)[1], together)
 
     @functools.cached_property
     def ranges(self) -> dict[str, tuple[float, float]] | None:
@@ -108,8 +105,8 @@ class Job:
     @property
     def _rank(self) -> np.ndarray:
         """Rank of every lane in the order in which chunks are cut, (lanes,)."""
-        shares = self.lanes.scene.plan.on_contact_line and self.width > 1
-        return self._body if shares else self.lanes.difficulty.ravel()
+        alike = self.chunks.alike and self.chunks.width > 1
+        return self._body if alike else self.lanes.difficulty.ravel()
 
     @functools.cached_property
     def _body(self) -> np.ndarray:
@@ -129,9 +126,7 @@ class Job:
     def runner(self) -> Runner:
         """Runner with the model of this sweep, to be compiled."""
         scenes, keys = (self.lanes.scene, self.open), tuple(self.lanes.axes)
-        return Runner(
-            scenes, keys, self.figures, self.width, self.solver, many=self.many, ranges=self.ranges
-        )
+        return Runner(scenes, keys, self.figures, self.chunks, self.solver, ranges=self.ranges)
 
     def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Figures by name and codes of `Outcome` of all lanes, arrays of the lanes' shape."""
@@ -166,7 +161,7 @@ class Job:
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
             "ranges": self.ranges,
-            "layout": [BLOCKS, BLOCK, LEAST, self.width, self.many],
+            "layout": [BLOCKS, BLOCK, LEAST, *self.chunks],
         }
         return json.dumps(about)
 
@@ -182,10 +177,10 @@ def runner_of(text: str) -> Runner:
         )
     scene, own = (_scene_of(text, about["dtype"]) for text in about["scenes"])
     solver = None if about["solver"] is None else Newton(**about["solver"])
-    *_, width, many = about["layout"]
+    *_, width, alike = about["layout"]
     ranges = about["ranges"] and {key: tuple(ends) for key, ends in about["ranges"].items()}
-    asked = about["keys"], about["figures"], width, solver
-    return Runner((scene, own), *asked, many=many, ranges=ranges)
+    asked = about["keys"], about["figures"], Chunks(width, alike), solver
+    return Runner((scene, own), *asked, ranges=ranges)
 
 
 def _scene_of(text: str, dtype: str) -> Scene:

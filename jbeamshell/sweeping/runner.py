@@ -28,13 +28,15 @@ from jbeamshell.solving.response import Response, figures, response
 from jbeamshell.solving.solve import run
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 
-ABREAST = 32  # most lanes of a chunk on a core, where they share a condensed body
+ABREAST = 128  # most lanes of a chunk on a core, where they share a condensed body
+APART = 32  # lanes of a chunk whose bodies are interpolated together
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models that are kept
 PER_LANE = ("load.amplitude", "contact.pressure")
-"""Numbers in which lanes of one chunk may differ on a contact line: the body and its factors are
-the same for all of them."""
-BODY = 8.0  # lanes that take as long as a condensed body and its factors
+"""Numbers in which lanes of one body may differ on a contact line: its tableaux are the same."""
+BODY = (
+    8.0  # lanes that take as long as a condensed body; one of those interpolated together takes 1
+)
 
 OF_A_CYCLE = {*FIGURES, "dissipation_error"}  # figures that are numbers
 
@@ -58,26 +60,37 @@ class Block(NamedTuple):
         return sizes == ((figures, lanes), (lanes,)) and kinds == ("f", np.int8)
 
 
-def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
-    """Number of lanes that advance together.
+class Chunks(NamedTuple):
+    """Chunks of lanes that advance together.
 
-    On the contact line it is the one by which all lanes cost least, if a body and its factors cost
-    as much as `BODY` lanes: lanes that share no body run alone, and so do those under a member that
-    goes on, which meet other events at each load.  Elsewhere it is a whole block on a GPU.  On a
-    core each lane runs alone: a wide chunk would wait for its slowest lane, and vector instructions
-    run over the nodes.
+    Attributes
+    ----------
+    width : lanes of a chunk
+    alike : True if those of a chunk share a body
+    """
+
+    width: int
+    alike: bool
+
+
+def chunks_of(scene: Scene, groups: np.ndarray, together: bool) -> Chunks:
+    """Chunks of a sweep, by which all lanes cost least.
+
+    Elsewhere than on a contact line a chunk is a whole block on a GPU.  On a core each lane runs
+    alone: a wide chunk would wait for its slowest lane, and vector instructions run over the nodes.
 
     Parameters
     ----------
-    alike : (groups,) numbers of lanes that may share a body
+    groups : (groups,) numbers of lanes that may share a body
+    together : True if bodies are interpolated, many at once
     """
-    if scene.plan.on_contact_line:
-        if goes_on(scene):
-            return 1
-        widths = 2 ** np.arange(ABREAST.bit_length())
-        costs = [np.sum(-(-alike // width)) * (BODY + width) for width in widths]
-        return int(widths[np.argmin(costs)])
-    return 1 if on_processor() else BLOCK
+    if not scene.plan.on_contact_line:
+        return Chunks(1 if on_processor() else BLOCK, alike=False)
+    widths = 2 ** np.arange(ABREAST.bit_length())
+    costs = [np.sum(-(-groups // width)) * (BODY + width) for width in widths]
+    if together and 2.0 * np.sum(groups) < min(costs):
+        return Chunks(APART, alike=False)
+    return Chunks(int(widths[np.argmin(costs)]), alike=True)
 
 
 def shared_keys(scene: Scene, keys: Sequence[str]) -> list[int]:
@@ -133,8 +146,7 @@ class Runner:
     Attributes
     ----------
     scene, open : scene with the settings that serve all lanes, and with those that were given
-    width : lanes of a chunk, see `width_of_chunks`
-    many : True for so many lanes that a program that takes longer to compile is worth it
+    chunks : see `chunks_of`
     ranges : least and most height ratio and Poisson's ratio, by key, if strips may be interpolated
     """
 
@@ -143,26 +155,26 @@ class Runner:
         scenes: tuple[Scene, Scene],
         keys: Sequence[str],
         figures: Sequence[str],
-        width: int,
+        chunks: Chunks,
         solver: Newton | None = None,
         *,
-        many: bool = False,
         ranges: Mapping[str, Range] | None = None,
     ) -> None:
         self.scene, self.open = scene, _ = scenes
         self.keys, self.figures = tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
-        self.width = width
+        self.width = chunks.width
         template, self._numbers = Template.of(scene)
         strips = None if ranges is None else shared(scene, self.keys, self.figures, ranges)
-        layout, self._strips = None, np.zeros(0, self.dtype)
+        layout: Layout | None = None
+        self._strips: Array | np.ndarray = np.zeros(0, self.dtype)
         if strips is not None:
             layout, self._strips = strips.layout, strips.numbers
-        self._shared = shared_keys(scene, self.keys) if width > 1 else []
+        self._shared = shared_keys(scene, self.keys) if chunks.alike and chunks.width > 1 else []
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
         asked = self.keys, axes, self.figures, solver
         given = self._shape, self._strips.size
-        self._about = template, layout, asked, given, self.dtype, many
+        self._about = template, layout, asked, given, self.dtype
 
     def compile(self) -> None:
         """Compile the model without running a lane, unless it was compiled before."""
@@ -232,7 +244,6 @@ def _compiled(
     asked: tuple[tuple[str, ...], tuple[int | None, ...], tuple[str, ...], Newton | None],
     given: tuple[tuple[int, ...], int],
     dtype: np.dtype,
-    many: bool,
 ) -> Callable[..., tuple[Array, Array]]:
     """Compiled program that runs one block.
 
@@ -273,7 +284,7 @@ def _compiled(
         jax.ShapeDtypeStruct((), np.int32),
     )
     small = template.scene(about[0]).plan.on_contact_line
-    options = quick_options(vectors=many) if small else None
+    options = quick_options() if small else None
     return jax.jit(block, compiler_options=options).lower(*about).compile()
 
 

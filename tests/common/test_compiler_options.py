@@ -18,12 +18,3 @@ def test_small_programs_take_only_known_options(monkeypatch):
     finally:
         jax.config.update("jax_disable_most_optimizations", True)
     assert small.quick_options.__wrapped__() is None
-
-
-def test_programs_of_many_lanes_keep_their_vectors():
-    jax.config.update("jax_disable_most_optimizations", False)
-    try:
-        short, long = (small.quick_options.__wrapped__(vectors=many) for many in (False, True))
-    finally:
-        jax.config.update("jax_disable_most_optimizations", True)
-    assert set(short) - set(long) == {small.VECTORS}

@@ -427,15 +427,17 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
     scene = jb.Scene().replace(
         {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 17}
     )
-    pressures, heights = np.linspace(5.0, 9.0, 64), np.linspace(0.05, 0.1, 64)
+    count = runner.ABREAST
+    pressures, heights = np.linspace(5.0, 9.0, count), np.linspace(0.05, 0.1, count)
     over = {"contact.pressure": pressures, "strip.height_ratio": heights}
 
     def width(over, paired=False):
-        return job.Job(lanes_of(scene, over, paired), scene, ("dissipation",)).width
+        return job.Job(lanes_of(scene, over, paired), scene, ("dissipation",)).chunks.width
 
     assert width(over) == runner.ABREAST
     assert width(over, paired=True) == 1
-    assert width(over | {"strip.height_ratio": np.repeat(heights[:32], 2)}, paired=True) == 2
+    pairs = np.repeat(heights[: count // 2], 2)
+    assert width(over | {"strip.height_ratio": pairs}, paired=True) == 2
     assert width({"strip.height_ratio": heights}) == 1
     assert width({"contact.pressure": pressures[:5]}) == 8
 
