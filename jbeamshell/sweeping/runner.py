@@ -20,7 +20,6 @@ from jbeamshell.contact_line.interpolation import Range
 from jbeamshell.contact_line.shared import Layout, shared
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene.mounting import goes_on
 from jbeamshell.scene.planning import turning
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
