@@ -69,10 +69,15 @@ def made(values: Values) -> jb.Scene:
     return changed(jb.library.standard(), TO_ITSELF | BEAMSHELL | values)
 
 
+def run(scene: jb.Scene) -> jb.History:
+    """Result of a scene, without the doubt that other overhangs make another scene of it."""
+    return jb.solve(scene, throw=False).but(overhung=None)
+
+
 def solved(scene: jb.Scene) -> jb.History | None:
     """Result of a scene; None if it has none."""
     try:
-        history = jb.solve(scene, throw=False)
+        history = run(scene)
     except jb.InputError:
         return None
     return history if history.converged else None
@@ -146,7 +151,7 @@ def compared(values: Values, other: Values | None, before: Row | None = None) ->
     begun = time.process_time()
     try:
         scene = made(values)
-        found = jb.solve(scene, throw=False)
+        found = run(scene)
     except jb.InputError as error:
         return {"outcome": "fails, and says so", "reason": str(error)}
     if not found.converged:

@@ -87,7 +87,7 @@ def bolted(entry: str) -> Floats:
     values = {"contact.bolts": BOLTS, "load.amplitude": 0.6, "load.entry": entry}
     values |= {"member.assembly": "frictionless", "model.nodes": 257}
     scene = jb.library.single_lap().replace(values)
-    history = jb.solve(scene)
+    history = jb.solve(scene, throw=False)  # both go on by 2 H, whatever other overhangs make of it
     return np.array([float(history.dissipation), float(history.secant_stiffness)])
 
 

@@ -221,8 +221,8 @@ def backbones(folder: Path) -> Figures:
             "beta": 1.0,
             "damping_ratio": damping[0],
         }
-        free = [Parameter("structure.chi_above", low=1e-3, high=1.0)]
-        model = identify.Assembly(mode, None, start | {"chi_above": 0.7}, point=0)
+        free = [Parameter("structure.chi", low=-0.999, high=0.0)]
+        model = identify.Assembly(mode, None, start | {"chi": -0.3}, point=0)
         fit = identify.fit(curves, model, [*free, *(f"structure.{name}" for name in start)])
         assert isinstance(fit.scene, identify.Assembly)
         curve = fit.scene.curve(amplitude[1::2])
@@ -242,8 +242,7 @@ def _halves(line: str) -> list[str]:
 
 def mode(_: Any, numbers: Mapping[str, jax.Array]) -> dynamics.Structure:
     """Mode of unit mass on a spring and a four-parameter Iwan element, with damping of its own."""
-    names = ("slip_force", "stiffness", "beta")
-    law = laws.Iwan4(chi=numbers["chi_above"] - 1.0, **{name: numbers[name] for name in names})
+    law = laws.Iwan4(**{name: numbers[name] for name in ("slip_force", "stiffness", "chi", "beta")})
     spring, joint = jnp.reshape(numbers["spring"], (1, 1)), dynamics.Attachment(law, 0)
     return dynamics.Structure([[1.0]], spring, [joint], damping_ratio=numbers["damping_ratio"])
 

@@ -17,8 +17,8 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import POSITIVE, require, require_choice, require_number
-from jbeamshell.contact_line.entry import REACH
 from jbeamshell.mechanics import elements
+from jbeamshell.scene.mounting import REACH
 from jbeamshell.scene.scene import Scene
 
 ORDERS = {"linear": 1, "quadratic": 2}

@@ -119,7 +119,8 @@ def _report(options: argparse.Namespace, result: Any, wall_s: float) -> int:
     else:
         figures = ((str(name), result[name].values) for name in list(result)[:-2])
         spans = [(name.replace("_", " "), _span(values)) for name, values in figures]
-        put(Summary(f"{about['summary']}; {wall_s:.1f} s", spans).as_text() + "\n")
+        notes = [about["mounting"]] if about["mounting"] else []
+        put(Summary(f"{about['summary']}; {wall_s:.1f} s", spans, notes).as_text() + "\n")
     for words in filter(None, (about["doubts"], about["notes"])):
         warn(words)
     written = [options.out] if options.out else []
@@ -149,7 +150,7 @@ def _plain(result: Any) -> dict[str, Any]:
         },
         "status": words[result["status"].values].tolist(),
         "doubtful": result["doubtful"].values.tolist(),
-    } | {name: result.attrs[name] for name in ("summary", "doubts", "notes", "plan")}
+    } | {name: result.attrs[name] for name in ("summary", "doubts", "notes", "plan", "mounting")}
 
 
 def _span(values: np.ndarray) -> str:

@@ -1,7 +1,8 @@
 """How the force enters a scene's members, and how it leaves them: the conditions of their ends.
 
 A member that goes on beyond the contact is continued by `REACH` half heights, from where on its
-length no longer matters.  It stretches there under an even load.  That stretch, l/(E'2H) for a
+length no longer matters, unless a support beside the load bends it, see
+`jbeamshell.scene.mounting`.  It stretches there under an even load.  That stretch, l/(E'2H) for a
 force at mid-height, is left out of the displacement u, which stays conjugate to the load: its loop
 holds the energy that friction takes.  So u is the mean displacement of the section X = L, but for
 what the shear there does on an even stretch.  That is less than half a per cent of u, but a fifth
@@ -27,9 +28,9 @@ from jax import Array
 from jbeamshell.contact_line.ends import Condition, End, beyond, compliance, end_section
 from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.section_form import SectionForm, W, without_lift
+from jbeamshell.scene.mounting import REACH, goes_on
 from jbeamshell.scene.scene import Scene
 
-REACH = 2.0  # of H, length beyond the contact from which on it no longer matters
 PER_REACH = 1.0 / 6.0  # of the elements of the contact, in that length
 LEAST = 24  # elements there, on 49 nodes a fourth of the error of 8 where little slips
 GIVEN = 16  # elements of a length that is given
@@ -43,11 +44,6 @@ class Held(NamedTuple):
 
     end: End
     fixed: np.ndarray
-
-
-def goes_on(scene: Scene) -> bool:
-    """True if members go on beyond the contact by a length that is not given."""
-    return scene.load.entry == "member" and scene.plan.elastic
 
 
 def states(scene: Scene) -> tuple[bool, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import equinox as eqx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +17,7 @@ from jbeamshell.common.pytrees import Tree
 from jbeamshell.laws.iwan4 import Iwan4
 from jbeamshell.laws.iwan4_fit import exponents, iwan4_through
 from jbeamshell.laws.law import Law
+from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.scene import Scene
 from jbeamshell.solving.steady_cycles import steady_cycles
 
@@ -32,12 +34,14 @@ class FourParameters(Tree):
     ----------
     law : model; forces are those of the whole width
     force, displacement, dissipation : (k,) amplitudes and energies of the joint's steady cycles
+    mounting : how a lap joint is held and loaded, in words; empty for anything else
     """
 
     law: Iwan4
     force: NDArray[np.float64]
     displacement: NDArray[np.float64]
     dissipation: NDArray[np.float64]
+    mounting: str = eqx.field(static=True, default="")
 
     @property
     def dissipation_error(self) -> NDArray[np.float64]:
@@ -65,6 +69,7 @@ class FourParameters(Tree):
             f"dissipation: off by {np.median(off):.1%} (median), {np.max(off):.1%} (worst)\n"
             f"displacement: off by {np.max(np.abs(self.displacement_error)):.1%} at most\n"
             f"power law D ~ F^n: n from {np.min(n):.2f} to {np.max(n):.2f}"
+            + (f"\n{self.mounting}" if self.mounting else "")
         )
 
 
@@ -91,9 +96,11 @@ def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters
     """
     require_number("width", width)
     found = _of_law(scene) if isinstance(scene, Law) else _of_scene(scene)
+    mounting = getattr(scene, "mounting", "") if isinstance(scene, Law) else in_words(scene)
     limit, stiffest, force, u, loss = found
     f, d = width * force, width * loss
-    return FourParameters(iwan4_through(width * limit, width * stiffest, f, u, d), f, u, d)
+    law = iwan4_through(width * limit, width * stiffest, f, u, d)
+    return FourParameters(law, f, u, d, mounting)
 
 
 def _of_scene(scene: Scene) -> tuple[Any, ...]:

@@ -17,6 +17,10 @@ STEPS = 200  # of a slider, about
 BELOW, ABOVE = 0.1, 4.0  # range of a slider, in parts of the scene's own number
 NEAR_GROSS_SLIP = 0.99  # part of gross slip up to which the slider of a force goes
 LARGEST_RATIO = 0.49  # Poisson's ratio
+HEIGHTS = {
+    "strip.height_ratio": "Height ratio η = H/(L/2)",
+    "strip.half_height": "Half height H [length]",
+}
 FACTOR = "pressure factor"
 BOLT = "bolt {} {}"  # number of the bolt, and "force" or "place"
 
@@ -48,8 +52,8 @@ def controls_of(scene: Scene) -> tuple[Control, ...]:
 def _controls(scene: Scene) -> Iterator[Control]:
     strip, contact, load = scene.strip, scene.contact, scene.load
     if strip.layers is None:
-        label = "Height ratio η = H/(L/2)"
-        yield _around("strip.height_ratio", label, float(strip.height_ratio))
+        key = strip.given_height.key  # as it was given, so that the scene's text stays so
+        yield _around(key, HEIGHTS[key], float(scene.get(key)))
     if scene.member.support != "none" and scene.member.layers is None and strip.layers is None:
         below = float(scene.member.beside(strip).height_ratio)
         yield _around("member.height_ratio", "Height ratio of the lower member η₂", below)

@@ -19,7 +19,7 @@ from jbeamshell.explorer.figures import Figures
 from jbeamshell.explorer.views import FIGURES, View, curve_of, drawable, view_of
 from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.measured.loops import Loop
-from jbeamshell.scene import library
+from jbeamshell.scene import library, mounting
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
 
@@ -30,6 +30,7 @@ CARDS = """
 .figures {display: flex; flex-wrap: wrap; gap: 4px 22px; margin: 0; font-size: 13px}
 .figures div {white-space: nowrap} .figures b {font-size: 15px}
 .figures span {color: #666}
+.mounting {margin: 4px 0 0; font-size: 13px; color: #666}
 """
 PAGE = """
 :host {display: grid !important; grid-template-columns: minmax(240px, 320px) minmax(0, 1fr);
@@ -289,7 +290,9 @@ class Page:
             if key in view.figures:
                 value = html.escape(in_words(view.figures[key]))
                 parts.append(f"<div>{name} <b>{value}</b> <span>[{unit}]</span></div>")
-        self._cards.object = f'<div class="figures">{"".join(parts)}</div>'
+        mounted = html.escape(mounting.in_words(self.scene))
+        below = f'<p class="mounting">{mounted}</p>' if mounted else ""
+        self._cards.object = f'<div class="figures">{"".join(parts)}</div>{below}'
         style = "font-size: 12px; margin: 0; white-space: pre-wrap; overflow-wrap: anywhere"
         self._text.object = f'<pre style="{style}">{html.escape(self.text)}</pre>'
 

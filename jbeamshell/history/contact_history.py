@@ -163,13 +163,19 @@ class ContactHistory(LoopFigures, eqx.Module):
 
     @property
     def dissipation(self) -> Array:
-        """Work of friction in the last cycle, D.
+        """Work of friction in the last cycle, D; 0 if it is rounding.
 
-        On a face it is the area of the loop, and 0 if that is rounding.
+        On a face it is the area of the loop.
         """
-        if not self.on_face:
-            return super().dissipation
-        return jnp.where(self._slips, self.dissipation_loop, 0.0)
+        if self.on_face:
+            return jnp.where(self._slips, self.dissipation_loop, 0.0)
+        return jnp.where(self._slips, super().dissipation, 0.0)
+
+    @property
+    def dissipation_loop(self) -> Array:
+        """Area of the last loop, with each branch integrated by parabolas; 0 if it is rounding."""
+        area = super().dissipation_loop
+        return jnp.where(jnp.abs(area) > self._rounding, area, 0.0)
 
     @property
     def closure(self) -> Array:
@@ -187,10 +193,15 @@ class ContactHistory(LoopFigures, eqx.Module):
     @property
     def _slips(self) -> Array:
         """True if slip in the last cycle is more than rounding."""
-        force, displacement = self.loop
         lost = self.dissipation_loop if self.on_face else super().dissipation
+        return lost > self._rounding
+
+    @property
+    def _rounding(self) -> Array:
+        """Largest work of the last cycle that is taken as zero."""
+        force, displacement = self.loop
         least = NO_SLIP[2 if self.on_face else 1]
-        return lost > least * jnp.ptp(force) * jnp.ptp(displacement)
+        return least * jnp.ptp(force) * jnp.ptp(displacement)
 
     @property
     def dissipation_error(self) -> Array:

@@ -19,7 +19,7 @@ from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
 from jbeamshell.history.profiles import Profiles
 from jbeamshell.history.reliability import doubts_of_run
 from jbeamshell.history.saved import write_history
-from jbeamshell.scene import planning, section_error
+from jbeamshell.scene import mounting, planning, section_error
 
 FIGURES = (
     "dissipation",
@@ -83,7 +83,7 @@ class History(Profiles, ContactLine, CycleFigures):
         -------
         dict
             numbers by name, None where undefined (such as 0/0); the sum of Newton iterations, the
-            worst status, and the doubts.
+            worst status, the mounting of a lap joint in words, and the doubts.
         """
         worst = Status(int(np.max(np.asarray(self.status))))
         turned = self.scene.load.kind == "moment"  # which no bar can be
@@ -94,6 +94,8 @@ class History(Profiles, ContactLine, CycleFigures):
         figures: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         figures["newton_iterations"] = int(np.sum(np.asarray(self.iterations)))
         figures["status"] = worst.name.lower()
+        if mounted := mounting.in_words(self.scene):
+            figures["mounting"] = mounted
         figures["doubts"] = list(self.doubts)
         return figures
 
@@ -128,6 +130,7 @@ class History(Profiles, ContactLine, CycleFigures):
             chosen += f"; halving the elements changed the loop by {percent:.2g} %"
         figures = self.figures()
         entered = section_error.in_words(self.scene, figures.get("slip_length")) if pulled else ""
+        mounted = figures.pop("mounting", "")
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
         turned = self.scene.load.kind == "moment"
         units = UNITS | TURNED_UNITS if turned else UNITS
@@ -138,7 +141,7 @@ class History(Profiles, ContactLine, CycleFigures):
             )
             for name, value in figures.items()
         ]
-        return Summary("\n".join(filter(None, (title, chosen, entered))), rows, doubts)
+        return Summary("\n".join(filter(None, (title, chosen, entered, mounted))), rows, doubts)
 
     def __str__(self) -> str:
         return self._summary.as_text()

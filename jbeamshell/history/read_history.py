@@ -95,7 +95,6 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     if scene.member.support != "none":
         member = number((steps, nodes, arrays["above.member"].shape[-1]))
         shapes["above"] = shapes["above"]._replace(member=member)
-    if "change" in arrays:
-        shapes["change"] = number(())
+    shapes |= {name: number(()) for name in ("change", "overhung") if name in arrays}
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
     return History(scene=scene, cycles=cycles, **shapes)

@@ -68,6 +68,9 @@ class Record(Tree):
         along X as those of the strip; None on a rigid base
     change : relative change of the dissipation or the secant stiffness, the larger one, when the
         elements were last halved; None for a grid that was not refined
+    overhung : dissipation of a single lap whose overhangs are as long as the overlap where its
+        scene leaves them open, over this one's; infinite if only that joint slips, NaN if it found
+        no equilibrium, None where nothing is left open
     """
 
     scene: Scene
@@ -93,6 +96,7 @@ class Record(Tree):
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     target: Array | None = None
     change: Array | None = None
+    overhung: Array | None = None
 
     @property
     def pressed(self) -> int:

@@ -15,6 +15,7 @@ from jax import Array
 from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
+from jbeamshell.scene.mounting import OVERHANGS, left_open, overhang
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
@@ -26,6 +27,7 @@ CLOSES = 5e-3
 TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
 OVERSHOOT = 1.0  # error under arc-length control, times the load steps per half cycle
 FINER = "take more model.nodes"
+ALLOW, LESS = "allow for that error", "take a smaller load.amplitude"
 
 
 class Run(Protocol):
@@ -36,6 +38,7 @@ class Run(Protocol):
     reaction: Array
     cycles: tuple[tuple[int, int, int], ...]
     change: Array | None
+    overhung: Array | None
 
     @property
     def converged(self) -> bool: ...
@@ -72,6 +75,15 @@ def change_of(coarse: Run, fine: Run) -> Array:
         return jax.numpy.max(np.nan_to_num(np.abs(one / other - 1.0), nan=np.inf))
 
 
+def ratio_of_losses(one: Run, other: Run) -> Array:
+    """Dissipation of a run over that of another; NaN if it did not converge."""
+    if not one.converged:
+        return np.asarray(np.nan)  # type: ignore[return-value]
+    lost, own = np.asarray(one.dissipation), np.asarray(other.dissipation)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(lost == own, 1.0, lost / own)  # type: ignore[return-value]
+
+
 def misses_tolerance(history: Run) -> bool:
     """True if the estimated error of a run exceeds its tolerance; never without friction."""
     plain = history.plain
@@ -91,16 +103,20 @@ def doubts_of_run(plain: Run) -> tuple[str, ...]:
         return _tension(plain)
     resolution = _resolution(plain) if scene.contact.friction > 0.0 else ()
     found = *_unsteady(plain), *resolution, *_tension(plain)
-    return *found, *_section(plain), *doubts_of_scene(scene)
+    return *found, *_mounting(plain), *_section(plain), *doubts_of_scene(scene)
 
 
 def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     allowed, found = doubted_from(scene.model.tolerance), []
     linear = scene.plan.kinematics == "linear" and scene.plan.section != "bar"  # which never turns
-    error = linear_error(scene) + sway(scene) if linear else 0.0
+    swayed = sway(scene) if linear else 0.0
+    error = linear_error(scene) + swayed if linear else 0.0
     if error > allowed:
-        found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")
+        bends = ""
+        if swayed > 0.0:
+            bends = f", and the load is {100.0 * swayed:.2g} % of what buckles the joint"
+        found.append(f"{_off(error)}: kinematics are linear{bends}; {_exact(scene, ALLOW)}")
     found += _buckling(scene)
     bent = OVERSHOOT / scene.plan.steps
     if scene.load.control == ARC_LENGTH and bent > allowed:
@@ -111,10 +127,12 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _exact(scene: Scene) -> str:
-    """Fix that makes a scene's kinematics exact."""
+def _exact(scene: Scene, instead: str) -> str:
+    """Fix that makes a scene's kinematics exact, or what a lap joint does instead."""
     if scene.member.support != "none":
-        return "a lap joint knows no others: take a smaller load.amplitude"
+        given = [key for key in OVERHANGS if overhang(scene, key) is not None]
+        nearer = f", or hold the joint nearer to its overlap, by a smaller {' and '.join(given)}"
+        return f"a lap joint knows no others: {instead}" + nearer * bool(given)
     section = "model.section = squeeze with " if scene.plan.elastic else ""
     return f"take {section}model.kinematics = exact"
 
@@ -130,7 +148,27 @@ def _buckling(scene: Scene) -> tuple[str, ...]:
     return (
         f"the {part} from X = {column.begin:.4g} to {column.end:.4g} may buckle: "
         f"its Euler load is {column.limit:.3g} and the compression reaches {column.force:.3g}, "
-        f"which linear kinematics do not see; {_exact(scene)}, or press more of the strip",
+        f"which linear kinematics do not see; {_exact(scene, LESS)}, or press more of the strip",
+    )
+
+
+def _mounting(history: Run) -> tuple[str, ...]:
+    """Doubt about a single lap whose scene leaves open how far it goes on."""
+    scene, ratio = history.scene, history.overhung
+    if ratio is None or abs(ratio - 1.0) <= doubted_from(scene.model.tolerance):
+        return ()
+    keys = left_open(scene)
+    longer = f"{' = '.join(keys)} = {float(scene.strip.length):.4g}, as long as the overlap, "
+    if np.isnan(ratio):
+        longer += "it finds no equilibrium"
+    elif np.isinf(ratio):
+        longer += "it loses energy, and here it loses none"
+    else:
+        longer += f"it loses {float(ratio):.3g} times as much"
+    return (
+        "a single lap bends by the lengths between its supports, which the scene leaves open: with "
+        f"{longer}; give {' and '.join(keys)}, or load.entry = face or guided if its members end "
+        "with the overlap",
     )
 
 

@@ -38,7 +38,8 @@ def driven(
     """
     pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
     by_force = [getattr(pull, "driver", None) == "force" for pull in pulls]
-    noisy = [pull.deviations is not None for pull in pulls]
+    both = [getattr(pull, "drive_noise", None) is not None for pull in pulls]
+    noisy = [pull.deviations is not None and not b for pull, b in zip(pulls, both, strict=True)]
     backward = any(a and b for a, b in zip(by_force, noisy, strict=True))
     force = not pulls or (backward and law.by_force)
     by = control or ("force" if force else "displacement")

@@ -107,9 +107,17 @@ class Experiment:
                 thinned = given.thinned(points, control) if isinstance(given, Loop) else given
                 self.measurements.append(thinned)
                 self.owners.append(owner)
+        if any(getattr(item, "deviations", None) is not None for item in self.measurements):
+            self.measurements = [  # beside others that know theirs, a guess is better than none
+                item.but(guessed=False) if isinstance(item, Loop) else item
+                for item in self.measurements
+            ]
         observations = [
             _observed(measurement, specimens[owner], [key for key in free if key in RIG])
             for owner, measurement in zip(self.owners, self.measurements, strict=True)
+        ]
+        self.measurements = [
+            item.without_turns if isinstance(item, Loop) else item for item in self.measurements
         ]
         prefixes = [f"{one.label}: " if len(specimens) > 1 else "" for one in specimens]
         self.labels = _distinct(
@@ -299,18 +307,40 @@ def _response(
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
 
-    def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
+    def residual(own: Array, off: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         given = dict(zip(keys, own, strict=True))
         at = model.replace({key: v for key, v in given.items() if key not in RIG})
         of_rig = {key: value for key, value in given.items() if key in RIG}
         through = with_rig(observation, of_rig) if of_rig else observation
+        if observation.shares:
+            through = through.moved(off)
         if layout is not None:
             at = at.prepared(layout.strip(numbers, at.own))
         rows, prediction, converged = through.residual(at, solver)
         return rows, (rows, prediction, converged)
 
-    jacobian, (rows, prediction, converged) = jax.jacfwd(residual, has_aux=True)(values)
+    by = (0, 1) if observation.shares else (0,)
+    slopes, (rows, prediction, converged) = jax.jacfwd(residual, by, has_aux=True)(
+        values, jnp.zeros(2)
+    )
+    jacobian = slopes[0]
+    if observation.shares:
+        rows, jacobian = _whitened(slopes[1] / observation.excess(rows), rows, jacobian)
     return rows, jacobian, prediction, converged
+
+
+def _whitened(common: Array, rows: Array, jacobian: Array) -> tuple[Array, Array]:
+    """Residual (n,) and its derivatives (n, k) without what some common errors do to them.
+
+    Common errors of unit variance, with the derivatives B (n, 2), leave the covariance I + B B' of
+    residuals; these are multiplied by its inverse root, I - B V w V' B' with the eigenvectors V and
+    eigenvalues s of B' B and w = (1 - (1 + s)^(-1/2))/s.
+    """
+    values, vectors = jnp.linalg.eigh(common.T @ common)
+    root = jnp.sqrt(1.0 + jnp.maximum(values, 0.0))
+    part = common @ (vectors / jnp.sqrt(root * (root + 1.0)))
+    part = jnp.where(jnp.all(jnp.isfinite(common)), part, 0.0)  # else no equilibrium was found
+    return rows - part @ (part.T @ rows), jacobian - part @ (part.T @ jacobian)
 
 
 @Small
@@ -350,9 +380,11 @@ def _filled(observation: Observation) -> Observation:
 
     Loops are thinned to about as many points; equal lengths let them share one compiled program.
     """
-    more = (0, -observation.weight.size % observation.length_step)
+    points = observation.weight.size
+    more = (0, -points % observation.length_step)
     longer = jax.tree.map(
-        lambda leaf: jnp.pad(leaf, more, mode="edge") if leaf.ndim else leaf, observation
+        lambda leaf: jnp.pad(leaf, more, mode="edge") if leaf.shape == (points,) else leaf,
+        observation,
     )
     return eqx.tree_at(lambda o: o.weight, longer, jnp.pad(observation.weight, more))
 

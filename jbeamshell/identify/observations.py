@@ -36,6 +36,9 @@ from jbeamshell.numerics.newton import Newton
 LENGTH_STEP = 32  # runs are filled up to multiples of this, where further points are cheap
 APPROACH = 8  # load steps from zero to the first point of a loop
 RUN_IN = 32  # approximate load steps of a closed loop's first, uncompared pass
+STEPS = 48  # load steps of a branch whose drive is noisy
+WRONG = 2.0  # residual over noise, in the mean, above which the model must be wrong
+BEFORE = APPROACH + RUN_IN  # load steps before the compared ones then
 POSITION_ROUNDING = 1e-6  # distance over L by which tables may round a position off the strip
 UNSOLVED_RESIDUAL = 10.0  # residual over the range of a trial without equilibrium: never accepted
 MODAL: tuple[type[AmplitudeCurve], ...] = (FrequencyCurve, DampingCurve, ForcedCurve)
@@ -64,6 +67,19 @@ class Observation(eqx.Module):
         """Range of the measured values, by which misfits are divided."""
         return float(np.ptp(np.asarray(self.measured)[np.asarray(self.weight) > 0.0]))
 
+    @property
+    def shares(self) -> bool:
+        """True if its points share two errors, see `moved`."""
+        return False
+
+    def moved(self, errors: Array) -> Observation:
+        """Copy moved by so many standard errors (2,) of the errors that all points share."""
+        return self
+
+    def excess(self, residual: Array) -> Array:
+        """Size of residuals (n,) over that of right models under much noise; at least 1."""
+        return jnp.ones(())
+
     @staticmethod
     def response_from(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Column of the measurement from the prediction, which may be on another scale."""
@@ -84,14 +100,78 @@ class Observation(eqx.Module):
         converged : True if every load step found equilibrium
         """
 
+    def compared(self, model: Model, solver: Newton) -> tuple[Array, Array, Array]:
+        """Prediction (n,), its difference (n,) from the data, and if every load step converged."""
+        prediction, converged = self.predict(model, solver)
+        return prediction, prediction - self.measured, converged
+
     def residual(self, model: Model, solver: Newton) -> tuple[Array, Array, Array]:
         """Weighted difference (n,), prediction (n,), and whether every load step converged."""
-        prediction, converged = self.predict(model, solver)
-        difference = (prediction - self.measured) * self.weight
+        prediction, off, converged = self.compared(model, solver)
+        difference = off * self.weight
         # With weights of 1 over the noise, a difference of one range is a large residual itself.
         ranges = jnp.maximum(1.0, self.weight * jnp.ptp(self.measured))
         unsolved = jnp.where(self.weight > 0.0, UNSOLVED_RESIDUAL * ranges, 0.0)
         return jnp.where(converged, difference, unsolved), prediction, converged
+
+
+class NoisyDrive(eqx.Module):
+    r"""Points whose place along the drive is known but for its noise.
+
+    The model runs on a path without noise, between the turns.  A point counts by its distance from
+    the model's branch, in which the noise of both columns is a unit long (orthogonal distances,
+    Boggs, Byrd & Schnabel, SIAM J. Sci. Stat. Comput. 8, 1987).  Beyond a turn the branch goes on
+    straight, because noise alone brings points there.
+
+    Attributes
+    ----------
+    sample : (n,) measured drive
+    up : (n,) 0 for points of the branch from the high turn, 1 for those of the way back
+    ratio : noise of the drive over that of the response
+    error : standard error of the response at the first point
+    turn_errors : (2,) errors of the levels of both turns, over that of the drive at the first point
+    """
+
+    sample: Array
+    up: Array
+    ratio: Array
+    error: Array
+    turn_errors: Array
+
+    def read(self, path: Array, response: Array) -> tuple[Array, Array]:
+        """Response (n,) at the samples, and its slopes (n,) there."""
+        x, y = self._branches(path), self._branches(response)
+        here = (
+            jnp.sum(jnp.sign(x[:, -1:] - x[:, :1]) * (self.sample[:, None] - x) > 0.0, axis=1) - 1
+        )
+        here, rows = jnp.clip(here, 0, STEPS - 1), jnp.arange(here.size)
+        (x0, x1), (y0, y1) = ((a[rows, here], a[rows, here + 1]) for a in (x, y))
+        slope = (y1 - y0) / (x1 - x0)
+        return y0 + slope * (self.sample - x0), slope
+
+    def distance(self, path: Array, response: Array, measured: Array, ratio: Array) -> Array:
+        """Distance (n,) of the branch above the measured points, in units of the response."""
+        x, y = self._branches(path) / ratio, self._branches(response)
+        dx, dy = jnp.diff(x), jnp.diff(y)
+        to_x, to_y = (self.sample / ratio)[:, None] - x[:, :-1], measured[:, None] - y[:, :-1]
+        length = dx**2 + dy**2
+        along = (to_x * dx + to_y * dy) / length
+        inner = jnp.arange(STEPS)
+        part = jnp.clip(
+            along, jnp.where(inner == 0, -jnp.inf, 0.0), jnp.where(inner == STEPS - 1, jnp.inf, 1.0)
+        )
+        square = (to_x - part * dx) ** 2 + (to_y - part * dy) ** 2
+        nearest = jnp.argmin(square, axis=1)[:, None]
+        off = jnp.sign(dx) * (dy * to_x - dx * to_y)
+        corner = part != along
+        root = jnp.sqrt(jnp.where(corner, square, 1.0))
+        distance = jnp.where(corner, jnp.sign(off) * root, off / jnp.sqrt(length))
+        return jnp.take_along_axis(distance, nearest, axis=1)[:, 0]
+
+    def _branches(self, column: Array) -> Array:
+        """Branch (n, steps + 1) of the path on which each point lies."""
+        both = [column[BEFORE + i : BEFORE + i + STEPS + 1] for i in (0, STEPS)]
+        return jnp.stack(both)[self.up]
 
 
 class LoopObservation(Observation):
@@ -105,10 +185,12 @@ class LoopObservation(Observation):
     path : (n,) load: an approach from zero, a closed loop's first pass, then the compared points
     free_zero : True if the zero of the response is unknown; the model's is then shifted to where
         it fits best
+    drive : where the compared points lie along a noisy drive; None if they are those of the path
     """
 
     path: Array
     free_zero: bool = eqx.field(static=True)
+    drive: NoisyDrive | None
     length_step: ClassVar[int] = LENGTH_STEP
     figures: ClassVar[tuple[str, ...]] = ("force", "displacement")
     own_error: ClassVar[float] = 0.1  # measured on loops of finite elements: .02 to .06
@@ -117,8 +199,41 @@ class LoopObservation(Observation):
     def of(cls, loop: Loop, model: Model) -> LoopObservation:
         """Run of a loop; raises `InputError` if a force exceeds gross slip."""
         control = model.control
+        if loop.drive_noise is not None:
+            return cls._of_noisy_drive(loop, model)
         run_in = getattr(loop.thinned(RUN_IN, control), control) if loop.closed else np.zeros(0)
         return cls._through(loop, model, run_in)
+
+    @classmethod
+    def _of_noisy_drive(cls, loop: Loop, model: Model) -> LoopObservation:
+        """Run of a mean loop whose drive is noisy too."""
+        control, middle = model.control, loop.middle
+        responding = loop.form.response(control)
+        high, low = getattr(loop, control)[[0, middle]]
+        # Dense at the turns, where the branches go on beyond the end of the path.
+        way = 0.5 + 0.5 * np.cos(np.pi * np.arange(2 * STEPS + 1) / STEPS)
+        clean = low + (high - low) * way
+        approach = np.linspace(0.0, high, APPROACH + 1)[1:]
+        path = np.concatenate([approach, clean[:: 2 * STEPS // RUN_IN][:RUN_IN], clean])
+        model.check_path(path)
+        own = loop.without_turns
+        errors, error = own.errors_of(control), own.errors_of(responding)
+        response = getattr(own, responding)
+        known = loop.deviations is not None
+        weight = 1.0 / error if known else np.min(error) / error / np.ptp(response)
+
+        def whole(column: Any) -> Array:
+            return jnp.asarray(np.pad(column, (BEFORE, path.size - BEFORE - column.size)))
+
+        drive = NoisyDrive(
+            whole(getattr(own, control)),
+            whole((np.arange(response.size) >= middle - 1).astype(int)),
+            jnp.asarray(errors[0] / error[0]),
+            jnp.asarray(error[0]),
+            jnp.asarray(loop.errors_of(control)[[0, middle]] / errors[0]),
+        )
+        free = loop.free_zero
+        return cls(whole(response), whole(weight), jnp.asarray(path), free, drive)
 
     @classmethod
     def of_backbone(cls, backbone: Backbone, model: Model) -> LoopObservation:
@@ -166,18 +281,58 @@ class LoopObservation(Observation):
             jnp.asarray(np.append(uncompared, weight)),
             jnp.asarray(path),
             getattr(measurement, "free_zero", False),
+            None,
         )
+
+    @property
+    def shares(self) -> bool:
+        """True if the levels of the turns, which all points share, are known but for an error."""
+        return self.drive is not None
+
+    def moved(self, errors: Array) -> Observation:
+        """Copy whose turns (2,) are moved by so many of their standard errors."""
+        assert self.drive is not None
+        high, low = self.path[BEFORE], self.path[BEFORE + STEPS]
+        shift = errors * self.drive.turn_errors * self.drive.ratio / self.weight[BEFORE]
+        part = (self.path - low) / (high - low)
+        path = self.path + part * shift[0] + (1.0 - part) * shift[1]
+        return eqx.tree_at(lambda o: o.path, self, path)
+
+    def excess(self, residual: Array) -> Array:
+        """Size of residuals (n,) over that of right models under much noise; at least 1."""
+        assert self.drive is not None
+        square = jnp.sum(residual**2) / jnp.sum(self.weight > 0.0)
+        usual = WRONG * self.weight[BEFORE] * self.drive.error
+        return jnp.maximum(square / usual**2, 1.0)
+
+    def along(self, model: Model, solver: Newton) -> tuple[Array, Array]:
+        """Responding column (n,) on the path, and whether every load step converged."""
+        return model.along(self.path, solver)
 
     def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,), and whether every load step converged."""
-        response, converged = model.along(self.path, solver)
-        return self.shifted(response), converged
+        prediction, _, converged = self.compared(model, solver)
+        return prediction, converged
 
-    def shifted(self, response: Array) -> Array:
+    def compared(self, model: Model, solver: Newton) -> tuple[Array, Array, Array]:
+        response, converged = self.along(model, solver)
+        drive = self.drive
+        if drive is None:
+            prediction = self.shifted(response, self.weight)
+            return prediction, prediction - self.measured, converged
+        read, slope = drive.read(self.path, response)
+        prediction = self.shifted(read, self.weight / jnp.sqrt(1.0 + (drive.ratio * slope) ** 2))
+        branch = response + prediction[BEFORE] - read[BEFORE]
+        off = drive.distance(self.path, branch, self.measured, drive.ratio)
+        # What a wrong model leaves beyond noise is an error of the response alone.
+        ratio = drive.ratio / self.excess(off * self.weight)
+        return prediction, drive.distance(self.path, branch, self.measured, ratio), converged
+
+    def shifted(self, response: Array, weight: Array) -> Array:
         """Response (n,) shifted to where it fits best, if its zero is unknown."""
         if not self.free_zero:
             return response
-        share = self.weight**2 / jnp.sum(self.weight**2)
+        share = weight**2 / jnp.sum(weight**2)
         return response - jnp.sum(share * (response - self.measured))
 
 

@@ -40,6 +40,7 @@ from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import CONTROLS
+from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import overridden, scene_from_values
 
@@ -339,7 +340,9 @@ def _strip(
         largest = [float(np.max(np.abs(drive))) for drive in drives if drive is not None]
         if largest:
             own["load.amplitude"] = max(largest)
-    return StripModel(scene_from_values(own)), free, notes
+    scene = scene_from_values(own)
+    mounting = in_words(scene, [parameter.key for parameter in free])
+    return StripModel(scene), free, [*notes, *filter(None, [mounting])]
 
 
 def _chosen(

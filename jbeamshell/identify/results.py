@@ -26,7 +26,9 @@ from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.profile_likelihood import MAX_ITERATIONS, TOLERANCE, Profile, profile
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, model_misfit
 from jbeamshell.laws import Law
-from jbeamshell.measured.form import by_form
+from jbeamshell.measured.form import LOOP, by_form
+
+SMALL = 0.1  # standard errors over which a response is differentiated
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -153,11 +155,27 @@ class Fit:
         return law
 
     @property
+    def noises(self) -> dict[str, float]:
+        """Noise of a sample of force and displacement over their ranges, by what the data tell.
+
+        It is empty where no driving column is noisy, which then counts as exact.
+        """
+        loops = [d for d in self.data if getattr(d, "drive_noise", None) is not None]
+        parts: dict[str, list[float]] = {name: [] for name in LOOP.answers if loops}
+        for loop in loops:
+            for name, own in parts.items():
+                noise = loop.drive_noise if name == loop.driver else loop.noise
+                own.append(noise / float(np.ptp(getattr(loop, name))))
+        return {name: float(np.sqrt(np.mean(np.square(own)))) for name, own in parts.items()}
+
+    @property
     def _summary(self) -> Summary:
         rows = [(k, f"{value:.6g} +- {self.errors[k]:.2g}") for k, value in self.values.items()]
         misfit = f"misfit {100 * self.misfit:.3g} % of the range"
         end = f"{_word(self.status)} after {self.model_runs} model runs"
-        return Summary("", rows, [misfit, end, *self.doubts, *self.notes])
+        both = " and ".join(f"{100 * part:.2g} % of the {n}" for n, part in self.noises.items())
+        told = [f"noise of a sample, which both count: {both}"] if both else []
+        return Summary("", rows, [misfit, *told, end, *self.doubts, *self.notes])
 
     def __repr__(self) -> str:
         return self._summary.as_text(28)
@@ -187,7 +205,7 @@ class Fit:
             "model_runs": self.model_runs,
             "doubts": list(self.doubts),
             "notes": list(self.notes),
-            "noise": {"of_the_range": u.noise, "measured": u.freedom is None},
+            "noise": {"of_the_range": u.noise, "measured": u.freedom is None} | self.noises,
             "independent_points": u.independent,
             "left_by_the_model": dict(zip(self.labels, self.left, strict=True)),
             "fisher": [
@@ -235,6 +253,14 @@ class Fit:
         best, experiment, u = self._best, self.problem.experiment, self.uncertainty
         per_noise = 1.0 / experiment.weight
         jacobian = best.jacobian[: per_noise.size] * (per_noise / experiment.emphasis)[:, None]
+        if self.noises:  # residuals are distances then, not differences of the response
+            steps = SMALL * np.diag(np.sqrt(np.diag(u.covariance)))
+            ends = [[self.problem(u.point + s * d).prediction for s in (-1.0, 1.0)] for d in steps]
+            rises = [
+                (high - low) / (2.0 * np.sum(d)) if np.any(d) else np.zeros(per_noise.size)
+                for (low, high), d in zip(ends, steps, strict=True)
+            ]
+            jacobian = np.transpose(rises)
         variance = np.maximum(np.einsum("ri,ij,rj->r", jacobian, u.covariance, jacobian), 0.0)
         variance += (u.scatter * per_noise) ** 2 * noise
         width = u.quantile(level) * np.sqrt(variance)

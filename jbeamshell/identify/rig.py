@@ -147,8 +147,7 @@ class RiggedObservation(LoopObservation):
     near: Array
     series: bool = eqx.field(static=True)
 
-    def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
-        """Responding column (n,), and whether every load step converged."""
+    def along(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         if model.control == "force":
             path = self.path - self.rig.force_zero
             response, converged = model.along(path, solver)
@@ -159,8 +158,7 @@ class RiggedObservation(LoopObservation):
             force, converged = run(path, solver)
             strip = path - self.rig.compliance * force
             response, _ = self.rig.seen(force, strip, self.phase)
-        response = response + self.rig.drift * self.time
-        return self.shifted(response), converged
+        return response + self.rig.drift * self.time, converged
 
     def _behind_spring(self, model: Model, path: Array, solver: Newton) -> tuple[Array, Array]:
         """Force of the strip (n,) where spring and strip together follow a path."""
@@ -234,6 +232,7 @@ def rigged(
         observation.weight,
         observation.path,
         observation.free_zero,
+        observation.drive,
         rig,
         jnp.asarray(_phase(path, path[compared], begins, ends)),
         jnp.asarray(passed),

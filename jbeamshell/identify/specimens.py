@@ -25,6 +25,7 @@ from jbeamshell.measured.form import Measurement, as_column
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.noisy_drive import noises_of
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
@@ -265,7 +266,8 @@ class Specimen:
             except InputError:  # a first loading, or an unsteady path
                 return [recording]
             noise = found.noise / np.ptp(found.path)
-            if len(found.cycles) == 1 and noise < QUIET:
+            quiet = noises_of(found, list(found.cycles)) is None
+            if len(found.cycles) == 1 and noise < QUIET and quiet:
                 return [recording]
         return steady_loops(recording, driver, self.drift)
 

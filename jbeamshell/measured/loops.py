@@ -42,6 +42,11 @@ class Loop(Measurement):
     normal_force : (points,) normal force [N or N/m], or None; of a mean loop its mean
     noise : standard deviation of a single sample of the responding column, from the scatter of
         repeated cycles; None without repeated cycles
+    drive_noise : standard deviation of a single sample of the driving column, where that is noisy:
+        both columns are then means over the same samples, and turns are the first, the middle and
+        the last point
+    drive_error : (points,) standard error of the driving column then
+    guessed : True if the noise of both columns is a guess by the roughness of a single cycle
     cycles : number of cycles of which this loop is the mean
     dropped : number of rows that lacked a number and were left out
     scatter : (points,) standard deviation over the cycles of the responding column, at each point;
@@ -62,6 +67,9 @@ class Loop(Measurement):
     time: Floats | None = None
     normal_force: Floats | None = None
     noise: float | None = None
+    drive_noise: float | None = None
+    drive_error: Floats | None = None
+    guessed: bool = False
     cycles: int = 1
     dropped: int = 0
     scatter: Floats | None = None
@@ -94,8 +102,11 @@ class Loop(Measurement):
             rows.append(("work of a cycle", work))
         if self.driver is not None:
             answer = LOOP.response(self.driver)
-            if self.noise is not None:
-                rows.append(("noise", f"{with_unit(self.noise, self.unit(answer))} of {answer}"))
+            both = ((self.noise, answer), (self.drive_noise, self.driver))
+            own = [
+                f"{with_unit(n, self.unit(name))} of {name}" for n, name in both if n is not None
+            ]
+            rows += [("noise", ", ".join(own))] if own else []
             rows.append(("driven by", self.driver))
         notes = self.notes if self.units else (*self.notes, NO_UNITS)
         return Summary(f"{self.label}: {self.force.size} points", rows, notes)
@@ -129,7 +140,10 @@ class Loop(Measurement):
                 told = f"the {name} is per width already, so the width does not divide it"
                 notes += [told] * (getattr(self, name) is not None)
                 continue
-            of_force = ["noise", "scatter"] if name == "force" and self.driver != "force" else []
+            own_noise = (
+                ["drive_noise", "drive_error"] if self.driver == "force" else ["noise", "scatter"]
+            )
+            of_force = own_noise if name == "force" else []
             for own in (name, *of_force):
                 if (value := getattr(self, own)) is not None:
                     columns[own] = value / width
@@ -144,7 +158,8 @@ class Loop(Measurement):
     @property
     def closed(self) -> bool:
         """True if the loop ends where it starts; a first loading does not."""
-        return all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in self.columns)
+        near = all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in self.columns)
+        return near or self.drive_noise is not None
 
     @property
     def standard_error(self) -> float | None:
@@ -159,12 +174,35 @@ class Loop(Measurement):
     @property
     def deviations(self) -> Floats | None:
         """Standard errors (points,) of the responding column; None without repeated cycles."""
+        if self.drive_noise is not None:
+            assert self.driver is not None
+            return None if self.guessed else self.errors_of(LOOP.response(self.driver))
         error = self.standard_error
         if error is not None and self.scatter is not None and self.driver is not None:
             answer = getattr(self, LOOP.response(self.driver))
             if error <= ROUNDING * np.ptp(answer):
                 return None  # copies of one cycle tell no noise
         return checked_noise(error, self.force.size, self.label)
+
+    def errors_of(self, column: str) -> Floats:
+        """Standard errors (points,) of a column, where both are noisy."""
+        assert self.scatter is not None
+        assert self.drive_error is not None
+        return self.drive_error if column == self.driver else self.scatter / np.sqrt(self.cycles)
+
+    @property
+    def without_turns(self) -> Loop:
+        """Points that are compared: all, but for turns that are known by points beside them."""
+        if self.drive_noise is None:
+            return self
+        inside = np.ones(self.force.size, bool)
+        inside[[0, self.middle, -1]] = False
+        return self.part(inside)
+
+    @property
+    def middle(self) -> int:
+        """Place of the low turn of a loop whose columns are both noisy."""
+        return self.force.size // 2
 
     def zeros(self) -> dict[str, float]:
         """Numbers about which the columns swing, which are zero unless sensors have offsets.
@@ -204,7 +242,7 @@ class Loop(Measurement):
         points : number of points to keep, about
         driver : driving column, "force" or "displacement"
         """
-        if self.force.size <= points:
+        if self.force.size <= points or self.drive_noise is not None:
             return self
         drive = getattr(self, driver)
         travel = np.append(0.0, np.cumsum(np.abs(np.diff(drive))))
@@ -215,7 +253,7 @@ class Loop(Measurement):
 
     def part(self, points: Any) -> Loop:
         """Loop of some of its points, by a mask, indices or a slice."""
-        names = ("force", "displacement", "time", "normal_force", "scatter")
+        names = ("force", "displacement", "time", "normal_force", "scatter", "drive_error")
         columns = {name: getattr(self, name) for name in names}
         kept = {name: column[points] for name, column in columns.items() if column is not None}
         return self.but(**kept)

@@ -142,13 +142,13 @@ def split_cycles(
         recording = whole.but(dropped=recording.dropped + whole.dropped, notes=notes)
     driver = driver or _driver(recording, smallest)
     path = smoothed_path(getattr(recording, driver), smallest)
-    turns, inner = _turns(path.smooth, path.band)
+    turns, inner = _turns(path)
     cycles = _cycles(path.smooth, turns, path.noise)
     if not cycles and (start := _once_round(recording, inner)) is not None:
         rolled = _rolled(recording, start)
         smooth = np.append(path.smooth[start:], path.smooth[1 : start + 1])
         path = path._replace(smooth=smooth)
-        turns, inner = _turns(smooth, path.band)
+        turns, inner = _turns(path)
         cycles, recording = _cycles(smooth, turns, path.noise), rolled
     if not cycles:
         raise InputError(_no_cycle(recording.label, driver, path, inner))
@@ -173,20 +173,20 @@ def _driver(recording: Loop, smallest: float) -> str:
     within = {}
     for name in (first, second):
         path = smoothed_path(getattr(recording, name), smallest)
-        turns, _ = _turns(path.smooth, path.band)
+        turns, _ = _turns(path)
         within[name] = sum(c.end - c.start for c in _cycles(path.smooth, turns, path.noise))
     return second if within[second] > MORE * within[first] else first
 
 
-def _turns(path: Floats, band: float) -> tuple[list[int], list[int]]:
+def _turns(path: SmoothPath) -> tuple[list[int], list[int]]:
     """Turns with the ends that complete a branch, and turns inside the path."""
-    found = extremes(path, band)
+    found = extremes(path.smooth, path.band)
     inner = found[1:-1]
     if len(found) < 3:
         return inner, inner
-    moves = np.abs(np.diff(path[found]))
-    first = 0 if moves[0] >= (1.0 - COMPLETE) * moves[1] else 1
-    last = len(found) if moves[-1] >= (1.0 - COMPLETE) * moves[-2] else -1
+    moves, slack = np.abs(np.diff(path.smooth[found])), 3.0 * path.noise
+    first = 0 if moves[0] >= (1.0 - COMPLETE) * moves[1] - slack else 1
+    last = len(found) if moves[-1] >= (1.0 - COMPLETE) * moves[-2] - slack else -1
     return found[first:last], inner
 
 

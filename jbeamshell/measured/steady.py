@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.closed_curve import FEWEST_KNOTS, PARTS, ClosedCurve, phases_of
 from jbeamshell.measured.drift import DRIFTS, without_drift
 from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.noisy_drive import noises_of, paired_means
 from jbeamshell.measured.reversals import SMALLEST, Floats, median_slope, noise_of
 from jbeamshell.measured.splitting import Cycles, split_cycles
 
@@ -81,38 +84,52 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
     knots = int(np.clip(per_cycle // 2, FEWEST_KNOTS, (points - 1) // 2))
     curve = ClosedCurve(np.concatenate([phase for _, phase in samples]), knots)
     heights = np.array([curve.through(phase, response[i]) for i, phase in samples])
-    repeats, limit = _repeating(curve, heights, steady, noise_of(response), per_cycle)
+    drive = getattr(found.recording, found.driver)
+    rises = np.diff([curve.parts(own) for own in heights]) * (PARTS // 2) / np.ptp(drive)
+    slope = float(np.sqrt(np.mean(rises**2)))
+    noise = float(np.hypot(noise_of(response), slope * noise_of(drive)))
+    repeats, limit = _repeating(curve, heights, steady, noise, per_cycle)
     own = np.flatnonzero(repeats)
-    where = np.concatenate([samples[i][0] for i in own])
-    phase = np.concatenate([samples[i][1] for i in own])
-    mean = curve.through(phase, response[where])
-    noise = scatter = None
-    if own.size > 1:
-        left = response[where] - curve.at(phase, mean)
-        noise = float(np.sqrt(np.sum(left**2) / max(phase.size - curve.size, 1)))
-        spread = np.std(heights[own], axis=0, ddof=1)
-        scatter = np.append(spread, spread[0])
-    low = float(np.mean([cycles[i].low for i in own]))
-    high = float(np.mean([cycles[i].high for i in own]))
-    drive = low + (high - low) * np.abs(curve.knots - 1.0)
-    columns = {found.driver: drive, found.responding: np.append(mean, mean[0])}
+    steady_ones = [cycles[i] for i in own]
     recording = found.recording
+    fields: dict[str, Any] = {"cycles": int(own.size)}
+    if (rough := noises_of(found, steady_ones)) is not None:
+        means = paired_means(found, steady_ones, rough)
+        drive, mean = means.columns
+        low, high = float(drive[drive.size // 2]), float(drive[0])
+        fields["drive_noise"], fields["noise"] = rough
+        fields["guessed"] = own.size == 1
+        fields["drive_error"] = rough.drive * means.errors[0]
+        error = np.hypot(rough.response * means.errors[1], means.bent)
+        fields["scatter"] = np.sqrt(own.size) * error
+    else:
+        where = np.concatenate([samples[i][0] for i in own])
+        phase = np.concatenate([samples[i][1] for i in own])
+        heights_of_all = curve.through(phase, response[where])
+        if own.size > 1:
+            left = response[where] - curve.at(phase, heights_of_all)
+            fields["noise"] = float(np.sqrt(np.sum(left**2) / max(phase.size - curve.size, 1)))
+            spread = np.std(heights[own], axis=0, ddof=1)
+            fields["scatter"] = np.append(spread, spread[0])
+        low = float(np.mean([cycle.low for cycle in steady_ones]))
+        high = float(np.mean([cycle.high for cycle in steady_ones]))
+        drive = low + (high - low) * np.abs(curve.knots - 1.0)
+        mean = np.append(heights_of_all, heights_of_all[0])
+    columns = {found.driver: drive, found.responding: mean}
     label = recording.label
-    pressing = recording.mean_normal_force(cycles[own[0]].start, cycles[own[-1]].end)
+    pressing = recording.mean_normal_force(steady_ones[0].start, steady_ones[-1].end)
     if found.groups > 1:
         label = f"{label}: {found.driver} {low:.4g} to {high:.4g}"
     return Loop(
         label=label,
-        noise=noise,
-        cycles=int(own.size),
         dropped=recording.dropped,
-        scatter=scatter,
         notes=(*recording.notes, *_notes(found, number, curve, heights, repeats, limit)),
         driver=found.driver,
         units=recording.units,
         normal_force=None if pressing is None else np.full(drive.size, pressing),
         force=columns["force"],
         displacement=columns["displacement"],
+        **fields,
     )
 
 
@@ -124,7 +141,7 @@ def _repeating(
     later = slice(len(heights) // 2, None)
     distance = np.sqrt(np.mean((parts - np.median(parts[later], axis=0)) ** 2, axis=1))
     usual = 3.0 * float(np.median(distance[later]))
-    noisy = 2.0 * noise * float(np.sqrt(PARTS / per_cycle))
+    noisy = 3.0 * noise * float(np.sqrt(PARTS / per_cycle))
     limit = max(steady * float(np.ptp(np.median(heights, axis=0))), usual, noisy)
     return distance <= limit, limit
 

@@ -15,9 +15,11 @@ from jbeamshell.plotting.style import (
     PALETTE,
     mark_decades,
     panels,
+    remark,
     single,
     style,
 )
+from jbeamshell.scene.mounting import in_words
 
 TIME = "$t$  [time]"
 AMPLITUDE, OF_STRIP = "amplitude  [length]", "amplitude of $u(L)$  [length]"
@@ -168,6 +170,7 @@ def ring_down_sheet(study: Any) -> Figure:
             mark_decades(below.xaxis)
             below.set_ylim(known.min() / room, known.max() * room)
         mark_decades(axes[1, 1].yaxis)
+        remark(axes[0, 0].figure, in_words(study.motion.scene))
     return axes[0, 0].figure
 
 

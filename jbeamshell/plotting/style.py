@@ -190,6 +190,12 @@ def panels(rows: int, columns: int, **options: Any) -> np.ndarray:
     return np.asarray(plt.subplots(rows, columns, figsize=size, squeeze=False, **options)[1])
 
 
+def remark(figure: Figure, words: str) -> None:
+    """Write a line above all axes of a figure, if there are words."""
+    if words:
+        figure.suptitle(words, fontsize=8, wrap=True)
+
+
 def given_axes(axes: Any, count: int, what: str) -> np.ndarray:
     """Axes as given, in their shape; raises `InputError` unless there is one for each of what."""
     drawn = np.asarray(axes, dtype=object)

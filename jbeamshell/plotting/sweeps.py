@@ -24,6 +24,7 @@ from jbeamshell.plotting.style import (
     looks,
     mark_decades,
     panels,
+    remark,
     single,
     style,
 )
@@ -142,16 +143,17 @@ def sweep_contour(
         shown = np.ma.masked_invalid(table)
         shown = np.ma.masked_less(shown, FLOOR * shown.max()) if wide else shown
         norm = LogNorm(shown.min(), shown.max()) if wide else Normalize(shown.min(), shown.max())
-        mesh = (x[right], y[up], shown[np.ix_(up, right)])
-        drawn = axes.pcolormesh(*mesh, norm=norm, cmap="viridis", shading="nearest")
+        log = [_is_wide(size) and bool(size.min() > 0.0) for size in (x, y)]
+        edges = _edges(x[right], log[0]), _edges(y[up], log[1])
+        drawn = axes.pcolormesh(*edges, shown[np.ix_(up, right)], norm=norm, cmap="viridis")
         label = FIGURES.get(figure, figure.replace("_", " "))
-        axes.figure.colorbar(drawn, ax=axes, label=label)
+        bar = axes.figure.colorbar(drawn, ax=axes, label=label)
         rows, columns = np.nonzero(doubtful)
         axes.plot(x[columns], y[rows], "x", color=DATA, markersize=3.0, markeredgewidth=0.7)
         axes.set(xlabel=_label(result[along]), ylabel=_label(result[per]), title=rest)
-        for size, scaled in ((x, axes.set_xscale), (y, axes.set_yscale)):
-            if _is_wide(size) and size.min() > 0.0:
-                scaled("log")
+        axes.set(xscale="log" if log[0] else "linear", yscale="log" if log[1] else "linear")
+        all_axes = zip((axes.xaxis, axes.yaxis, bar.ax.yaxis), (*log, wide), strict=True)
+        mark_decades(*(axis for axis, is_log in all_axes if is_log))
         axes.grid(visible=False)
     return axes
 
@@ -217,6 +219,7 @@ def sweep_sheet(result: Dataset) -> Figure:
         sweep(result, row[0], figure=str(next(iter(result.data_vars))))
         if both:
             master_curve(result, row[1])
+        remark(row[0].figure, result.attrs.get("mounting", ""))
     return row[0].figure
 
 
@@ -255,6 +258,15 @@ def _plane(values: DataArray, along: str, per: str | None) -> tuple[np.ndarray, 
     rest = (f"{_symbol(key)} = {float(middle[key]):.4g}" for key in others)
     shown = middle if per is None else middle.transpose(per, along)
     return np.atleast_2d(shown.values), ", ".join(rest)
+
+
+def _edges(values: np.ndarray, log: bool) -> np.ndarray:
+    """Edges (k + 1,) of cells around rising values (k,), half way between them on their scale."""
+    on_scale = np.log(values) if log else values
+    widths = np.diff(on_scale) if values.size > 1 else np.ones(1)
+    ends = on_scale[0] - 0.5 * widths[0], on_scale[-1] + 0.5 * widths[-1]
+    edges = np.concatenate([ends[:1], on_scale[:-1] + 0.5 * np.diff(on_scale), ends[1:]])
+    return np.exp(edges) if log else edges
 
 
 def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, hue: np.ndarray, name: str | None) -> None:

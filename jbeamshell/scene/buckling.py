@@ -92,10 +92,11 @@ def weakest_column(scene: Parts, numbers: Numbers | None = None) -> Column:
 
 
 def sway(scene: Parts) -> float:
-    """Relative error of linear kinematics in a single lap: its load over the load that buckles it.
+    """Load of a single lap over the load that buckles it; zero for any other scene.
 
-    By so much the load's moment grows, or falls, with the deflection (Timoshenko & Gere 1961,
-    section 1.11).
+    It bounds how much the moments at the contact grow under a push, and fall under a pull, with the
+    deflection (Timoshenko & Gere 1961, section 1.11).  In a stepped column that is as stiff in the
+    contact as both members together they change by .3 to .7 of it, and their range by .03 of it.
     """
     if scene.member.support != "clamped" or scene.load.cycles == 0:
         return 0.0

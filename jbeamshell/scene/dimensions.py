@@ -91,7 +91,7 @@ def dimensions_of(texts: Mapping[str, Any]) -> Dimensions:
         values["strip.half_height"] = 0.5 * sizes["thickness"]
     notes: tuple[str, ...] = ()
     if "bolts" in texts:
-        values["contact.pressure"], notes = _bolted(texts["bolts"], sizes)
+        values["contact.bolts"], notes = _bolted(texts["bolts"], sizes)
     elif "head" in texts:
         raise InputError(f"head = {texts['head']!r}: belongs to bolts: give bolts, or leave it out")
     return Dimensions(values, sizes.get("width"), notes)
@@ -137,7 +137,7 @@ def _size(name: str, text: Any) -> float:
 
 
 def _bolted(text: Any, sizes: Mapping[str, float]) -> tuple[list[list[float]], tuple[str, ...]]:
-    """Pressure of bolts as rows [X, p], and notes."""
+    """Bolts as rows [X, force per width, width of the patch], and notes."""
     require("bolts", text, "pressure" not in sizes, "give either bolts or a pressure")
     for name in ("length", "thickness", "width"):
         fix = f"their pressure needs {name}: give it, such as {name} = {DIMENSIONS[name].example}"
@@ -158,7 +158,7 @@ def _bolted(text: Any, sizes: Mapping[str, float]) -> tuple[list[list[float]], t
             require("bolts", kind, place <= length, fix)
             low, high = max(place - reach, 0.0), min(place + reach, length)
             patches.append((low, high, force / sizes["width"] / (high - low)))
-    return _table(patches, length), tuple(notes)
+    return _apart(patches, length), tuple(notes)
 
 
 def _bolts(text: Any) -> tuple[float, list[float]]:
@@ -184,8 +184,8 @@ def _usual_head(kind: str, force: float) -> float:
     return HEAD * fits[0]
 
 
-def _table(patches: list[tuple[float, float, float]], length: float) -> list[list[float]]:
-    """Rows [X, p] of the sum of even pressures p between low and high."""
+def _apart(patches: list[tuple[float, float, float]], length: float) -> list[list[float]]:
+    """Rows of bolts for the sum of even pressures p between low and high, which may overlap."""
     ends = sorted({0.0, length, *(end for low, high, _ in patches for end in (low, high))})
     edges = [0.0]
     for end in ends[1:]:
@@ -196,5 +196,7 @@ def _table(patches: list[tuple[float, float, float]], length: float) -> list[lis
     for start, stop in itertools.pairwise(edges):
         middle = 0.5 * (start + stop)
         pressure = float(np.sum([p for low, high, p in patches if low < middle < high]))
-        rows += [[start, pressure], [stop, pressure]]
+        if pressure > 0.0:
+            width = stop - start
+            rows.append([start + 0.5 * width, pressure * width, width])
     return rows

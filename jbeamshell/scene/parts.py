@@ -160,9 +160,12 @@ class Contact(ContactKeys):
     Attributes
     ----------
     law : friction law of one contact point
+    bolted : True if bolts were given last, so that the pressure on the bottom face is theirs under
+        a clamped second member, and zero without one
     """
 
     law: FrictionLaw = eqx.field(default_factory=SharpSlip)
+    bolted: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self) -> None:
         is_law = isinstance(self.law, FrictionLaw)

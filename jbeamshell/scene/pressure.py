@@ -90,6 +90,8 @@ def check_pressure(key: str, pressure: np.ndarray) -> None:
 def bolt_pressure(bolts: Array, length: Array) -> Array:
     """Pressure table (4k, 2) of bolts, each an even pressure on a patch.
 
+    Where patches touch the pressure steps from one to the next, which takes two rows less.
+
     Parameters
     ----------
     bolts : (k, 3) rows of X, force per width and width of the patch, rising in X
@@ -104,6 +106,7 @@ def bolt_pressure(bolts: Array, length: Array) -> Array:
     require(key, bolts, bolts.ndim == 2 and bolts.shape[1] == 3, BOLTS)
     middle, force, width = bolts.T
     begin, end = middle - 0.5 * width, middle + 0.5 * width
+    kept = np.ones(4 * bolts.shape[0], bool)
     if not is_traced(bolts, length):
         good = bool(np.all(np.isfinite(bolts)) and np.all(np.asarray(bolts[:, 1:]) > 0.0))
         require(key, bolts, good, "forces and widths must be positive numbers")
@@ -113,10 +116,13 @@ def bolt_pressure(bolts: Array, length: Array) -> Array:
         require(key, bolts, inside and bool(np.min(np.asarray(begin)) >= -slack), fix)
         apart = bool(np.all(np.asarray(begin[1:] - end[:-1]) >= -slack))
         require(key, bolts, apart, "patches overlap, or X falls: sort the rows and narrow them")
+        touch = 4 * np.flatnonzero(np.asarray(begin[1:] - end[:-1]) <= slack)
+        kept[[*(touch + 3), *(touch + 4)]] = False
     pressure = force / width
     begin = jnp.maximum(begin, jnp.append(0.0, end[:-1]))  # round-off between patches that touch
     rows = [(begin, 0.0 * pressure), (begin, pressure), (end, pressure), (end, 0.0 * pressure)]
-    return jnp.stack([jnp.stack(row, axis=1) for row in rows], axis=1).reshape(-1, 2)
+    table = jnp.stack([jnp.stack(row, axis=1) for row in rows], axis=1).reshape(-1, 2)
+    return table if kept.all() else table[kept]
 
 
 def check_gap(gap: np.ndarray) -> None:

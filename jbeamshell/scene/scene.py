@@ -290,12 +290,7 @@ class Scene(Tree):
             heading, name = key.split(".")
             parts[heading][name] = value
         contact = parts["contact"]
-        if "bolts" in contact:
-            rows = leaf_of("contact.bolts", contact.pop("bolts"))
-            length = as_leaf(parts["strip"].get("length", self.strip.length), "strip.length")
-            contact["pressure"] = bolt_pressure(rows, length)
-            clamped = parts["member"].get("support", self.member.support) == "clamped"
-            contact.setdefault("bottom_pressure", contact["pressure"] if clamped else 0.0)
+        self._say_pressures(parts)
         if "law" in contact or "smoothing" in contact:
             contact["law"] = _make_law(self.contact.law, contact)
         # An amplitude of another control or kind has another unit: it must be given anew.
@@ -308,6 +303,30 @@ class Scene(Tree):
             if changes
         }
         return dataclasses.replace(self, **new_parts)
+
+    def _say_pressures(self, parts: dict[str, dict[str, Any]]) -> None:
+        """Say the pressures of bolts, of which the bottom one follows the member's support.
+
+        It does so until it is given itself, or another pressure takes the place of the bolts.
+
+        Parameters
+        ----------
+        parts : new values by heading and name
+        """
+        contact, member = parts["contact"], parts["member"]
+        bolted = "bolts" in contact
+        if bolted:
+            rows = leaf_of("contact.bolts", contact.pop("bolts"))
+            length = as_leaf(parts["strip"].get("length", self.strip.length), "strip.length")
+            contact["pressure"] = bolt_pressure(rows, length)
+        elif self.contact.bolted and "pressure" in contact:
+            contact.setdefault("bottom_pressure", TABLE["contact.bottom_pressure"].default)
+        if "bottom_pressure" in contact:
+            contact["bolted"] = False
+        elif bolted or (self.contact.bolted and "support" in member):
+            clamped = member.get("support", self.member.support) == "clamped"
+            top = contact.get("pressure", self.contact.pressure)
+            contact |= {"bolted": True, "bottom_pressure": top if clamped else 0.0}
 
     def pinned(self, numbers: Numbers | None = None) -> Scene:
         """Copy whose settings are given as they are planned, so that no change decides others.
@@ -332,8 +351,8 @@ class Scene(Tree):
         return self.but(plan=finer(self))
 
     def in_one_form(self) -> Scene:
-        """Copy whose strip is given in one form, so that programs do not ask what was given."""
-        return self.but(strip=self.strip.in_one_form())
+        """Copy with its numbers in one form, so that programs do not ask what was given."""
+        return self.but(strip=self.strip.in_one_form(), contact=self.contact.but(bolted=False))
 
     def serving(self, keys: Collection[str]) -> Scene:
         """Copy on the beamshell if some numbers are its own and the section is open.

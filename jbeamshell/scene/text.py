@@ -9,6 +9,7 @@ import numpy as np
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.summary import Summary
 from jbeamshell.mechanics.friction import law_name
+from jbeamshell.scene import mounting
 from jbeamshell.scene.forms import HOLDERS
 from jbeamshell.scene.keys import TABLE, unit_of
 from jbeamshell.scene.linearisation import Parts
@@ -43,7 +44,8 @@ def summary(scene: Parts, own_energy: bool) -> Summary:
         rows.append((name, _shown(value) + (f"  [{unit}]" if unit not in ("", "1") else "")))
     energy = " with a strain energy of its own" * own_energy
     title = f"Strip{energy}: {scene.plan}"
-    return Summary(title, rows, tuple(filter(None, [in_words(scene)])))
+    notes = in_words(scene), mounting.in_words(scene)
+    return Summary(title, rows, tuple(filter(None, notes)))
 
 
 def _differs(value: Any, default: Any) -> bool:

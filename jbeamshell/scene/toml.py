@@ -120,7 +120,7 @@ def _bolts(scene: Scene) -> dict[str, Any]:
     if not np.array_equal(copy.pressure, given.pressure):
         return none
     said = {"contact.bolts": rows, "contact.pressure": None}
-    if np.array_equal(copy.bottom_pressure, given.bottom_pressure):
+    if given.bolted and np.array_equal(copy.bottom_pressure, given.bottom_pressure):
         said["contact.bottom_pressure"] = None
     return said
 

@@ -12,6 +12,7 @@ from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.keys import CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.load_path import check
+from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.planning import has_contact_line, may_be_elastic, reference
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
@@ -42,11 +43,13 @@ class Advice:
     def figures(self) -> dict[str, Any]:
         """Advice as plain values for JSON."""
         own = {"tolerance": self.scene.model.tolerance, "to": self.to, "reason": self.reason}
-        return own | {"settings": self.settings}
+        mounting = in_words(self.scene)
+        return own | {"settings": self.settings} | ({"mounting": mounting} if mounting else {})
 
     def __str__(self) -> str:
         percent = 100.0 * self.scene.model.tolerance
-        return f"{self.scene.plan}, for {percent:g} % of {self.to}: {self.reason}"
+        chosen = f"{self.scene.plan}, for {percent:g} % of {self.to}: {self.reason}"
+        return "\n".join(filter(None, (chosen, in_words(self.scene))))
 
 
 def advise(scene: Scene, tolerance: float | None = None) -> Advice:

@@ -5,13 +5,16 @@
 2. `_walked` follows the path on the contact line, exactly in time (`jbeamshell.contact_line`);
    `_marched` takes load steps by Newton's method.
 3. `_refined` halves the elements while the estimated error exceeds the tolerance.
-4. What may still be wrong is a doubt, see `jbeamshell.history.reliability`.
+4. `_overhung` solves a single lap anew whose scene leaves its overhangs open, to tell what they
+   decide.
+5. What may still be wrong is a doubt, see `jbeamshell.history.reliability`.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -29,13 +32,15 @@ from jbeamshell.contact_line.solve import Cycles, walks_pressures
 from jbeamshell.contact_line.solve import solve as walk
 from jbeamshell.contact_line.strip import Strip
 from jbeamshell.history.history import History
-from jbeamshell.history.reliability import change_of, misses_tolerance
+from jbeamshell.history.reliability import change_of, misses_tolerance, ratio_of_losses
 from jbeamshell.load_steps.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.load_steps.path_state import StepResults, initial_state
 from jbeamshell.load_steps.recovery import recover
 from jbeamshell.load_steps.stepping import march
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.domain import stays_below
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
+from jbeamshell.scene.mounting import left_open
 from jbeamshell.scene.planning import refinements
 from jbeamshell.scene.scene import Scene
 from jbeamshell.solving.advice import within
@@ -180,7 +185,7 @@ def _walked(
         failed = history.status[-1] != Status.CONVERGED
         return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
     if cycles and history.converged:
-        history = _refined(history, walked)
+        history = _overhung(_refined(history, walked), path, own)
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
@@ -236,6 +241,33 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
             break
         history = finer.but(change=change_of(history, finer))
     return history
+
+
+def _overhung(history: History, path: LoadPath, own: bool) -> History:
+    """History that knows what other overhangs make of a single lap that leaves them open.
+
+    They are as long as the overlap, which is a body of its own, and bear the same forces.  A joint
+    that slides as a whole under a displacement bears none that is known, and learns nothing.
+
+    Parameters
+    ----------
+    history : converged run of a load path with cycles
+    path, own : see `jbeamshell.contact_line.solve.solve`
+    """
+    scene = history.scene
+    keys = left_open(scene)
+    if not keys or not scene.contact.friction > 0.0:
+        return history
+    by_force = scene.load.control == "force"
+    largest = float(np.max(np.abs(history.force)))
+    slides = scene.member.bolt_stiffness is None and not stays_below(largest, scene.gross_slip, 1.0)
+    if slides and not by_force:
+        return history
+    values: dict[str, Any] = dict.fromkeys(keys, scene.strip.length)
+    values |= {"load.control": "force", "load.amplitude": np.asarray(largest)}
+    forces = path._replace(target=history.force)
+    other = walk(scene.pinned().replace(values), forces, history.cycles, own=own and by_force)
+    return history.but(overhung=ratio_of_losses(other, history))
 
 
 def _precise(scene: Scene) -> bool:

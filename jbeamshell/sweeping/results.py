@@ -16,6 +16,7 @@ from jbeamshell.history.figures import TURNED_UNITS, UNITS
 from jbeamshell.history.reliability import doubted_from, finer_grid
 from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.load_path import check
+from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 
@@ -69,6 +70,7 @@ def dataset(
         "doubts": "; ".join(_doubts(lanes, status, errors)),
         "notes": "; ".join([*notes, *_notes(lanes, status)]),
         "plan": str(scene.plan),
+        "mounting": in_words(scene, lanes.axes),
         "scene": text,
         "version": version("jbeamshell"),
     }

@@ -18,6 +18,7 @@ from jbeamshell.cli.main import main
 from jbeamshell.contact_line.section import section_form
 from jbeamshell.contact_line.stations import stations
 from jbeamshell.contact_line.strip import lap_members, pressing
+from jbeamshell.measured.example import data_folder
 
 # Few nodes are quick; their meshes are doubted.
 pytestmark = pytest.mark.filterwarnings("ignore::jbeamshell.DoubtfulWarning")
@@ -461,6 +462,25 @@ def test_tables_that_do_not_fit_the_model_are_refused():
     )
     with pytest.raises(jb.InputError, match="a part moves freely"):
         loose.condensed([[1, 0.0], [2, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("friction", "amplitude", "assembly", "points"),
+    [
+        (0.9, 0.2, "frictional", True),
+        (5.0, 0.1, "frictionless", True),
+        (1.0, 0.01, "frictionless", False),
+    ],
+)
+def test_a_line_on_which_nothing_slips_loses_exactly_nothing(friction, amplitude, assembly, points):
+    body = jb.Substructure.read(data_folder() / "calculix_body.npz")
+    choices = {"assembly": assembly, "points": points, "throw": False}
+    history = jb.solve_contact(body, friction=friction, amplitude=amplitude, **choices)
+    lost = [history.figures()[name] for name in ("dissipation", "dissipation_loop", "loss_factor")]
+    assert lost == [0.0, 0.0, 0.0]
+    little = jb.solve_contact(body, friction=0.1, amplitude=0.05, **choices)
+    assert float(little.dissipation) > 1e-14  # of a loop of 7e-8, which is no rounding
+    assert float(little.dissipation_loop) == pytest.approx(float(little.dissipation), rel=0.01)
 
 
 def test_gross_slip_is_told():

@@ -43,6 +43,18 @@ def test_run_prints_one_json_object(cli):
     assert {k: v for k, v in figures.items() if k not in TIMES} == history.figures()
 
 
+def test_bolts_of_a_specimen_press_both_members_of_a_single_lap():
+    """Whatever the entry of the force: a clamp would take what is not balanced, silently."""
+    lap = {"member.support": "clamped", "strip.far_end": "free", "load.entry": "face"}
+    lap |= {"model.section": "shell", "model.nodes": 9}
+    size = ("--length", "120mm", "--thickness", "12mm", "--width", "50mm", "--modulus", "210GPa")
+    words = ("--bolts", "2x8kN@30mm,90mm", "--head", "13mm", *options(lap))
+    given = main._parser().parse_args(["run", *size, *words, "--set", "load.amplitude=1kN"])
+    chosen = arguments.scene_of(given)
+    assert np.asarray(chosen.contact.bolts).shape == (2, 3)
+    assert np.array_equal(chosen.contact.bottom_pressure, chosen.contact.pressure)
+
+
 def test_run_prints_text_to_read(cli):
     own = {"strip.height_ratio": 0.2, "load.amplitude": 0.5, "load.steps_per_half_cycle": "auto"}
     code, out, err = cli("run", *BASE, *options(own))

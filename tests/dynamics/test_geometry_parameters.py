@@ -56,6 +56,7 @@ class TestScenes:
 
     def test_a_single_lap_joint_is_nearly_an_iwan_model(self):
         found = four_parameters(jb.library.single_lap())
+        assert str(found).splitlines()[-1].startswith("single lap: held at X = 0")
         assert np.median(np.abs(found.dissipation_error)) < 0.04
         assert np.max(np.abs(found.displacement_error)) < 0.05
 

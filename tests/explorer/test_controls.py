@@ -24,7 +24,7 @@ def test_a_strip_has_five_sliders_and_a_joint_its_bolts():
 
 
 def test_a_scene_that_is_only_pressed_has_no_load_and_layers_no_height():
-    assert names_of(library.receding()) == ["strip.height_ratio", FACTOR, "strip.poisson_ratio"]
+    assert names_of(library.receding()) == ["strip.half_height", FACTOR, "strip.poisson_ratio"]
     assert names_of(library.bimaterial()) == ["contact.pressure"]
 
 
@@ -57,6 +57,20 @@ def test_a_bolt_keeps_its_width_where_it_goes_and_presses_both_faces():
     both = moved.contact.pressure, moved.contact.bottom_pressure
     assert np.array_equal(*both)
     assert bolts_of(scene)[0] == pytest.approx([1.0, 20.0, 0.5])
+
+
+@pytest.mark.parametrize("stiffness", ["strip.youngs_modulus", "strip.axial_stiffness"])
+def test_the_slider_of_the_height_keeps_the_stiffness_and_the_form_that_were_given(stiffness):
+    """What was given as E and H stays E, and the slider moves H."""
+    given = {"strip.length": 120.0, "strip.half_height": 6.0, stiffness: 2e6}
+    scene = jb.Scene().replace(given | {"load.amplitude": 100.0})
+    height = controls_of(scene)[0]
+    assert (height.name, height.value) == ("strip.half_height", pytest.approx(6.0))
+    moved = scene_at(scene, {height.name: 9.0})
+    assert float(moved.get(stiffness)) == 2e6
+    assert moved.strip.said == {"strip.half_height", stiffness}
+    longer = moved.replace({"strip.length": 240.0})
+    assert float(longer.strip.half_height) == 9.0
 
 
 def test_pressures_in_tables_have_a_factor():

@@ -460,3 +460,88 @@ print(json.dumps([str(history.force.dtype), float(history.dissipation)]))
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     exact = float(jb.solve(STRIP.replace(shell)).dissipation)
     assert json.loads(run.stdout) == ["float32", pytest.approx(exact, rel=2e-6)]
+
+
+# --- mounting of a single lap -------------------------------------------------------------------
+
+OPEN = jb.library.single_lap().replace({"load.entry": "member", "model.nodes": 65})
+KEYS_OF_OVERHANGS = ("member.overhang", "strip.overhang")
+
+
+def with_overhangs(scene, length):
+    return scene.replace(dict.fromkeys(KEYS_OF_OVERHANGS, length))
+
+
+def mounted(history):
+    return [doubt for doubt in history.doubts if "bends by the lengths" in doubt]
+
+
+@pytest.mark.parametrize("section", ["plane", "squeeze"])
+def test_a_single_lap_without_overhangs_is_doubted_by_what_they_make(section):
+    scene = OPEN.replace({"model.section": section})
+    history = jb.solve(scene, throw=False)
+    (doubt,) = mounted(history)
+    longer = jb.solve(with_overhangs(scene, 2.0), throw=False)
+    ratio = float(longer.dissipation / history.dissipation)
+    assert ratio > 1.2
+    assert float(history.overhung) == pytest.approx(ratio, rel=1e-9)
+    assert "with member.overhang = strip.overhang = 2, as long as the overlap" in doubt
+    assert f"it loses {ratio:.3g} times as much" in doubt
+    assert longer.overhung is None
+    assert not mounted(longer)
+
+
+def test_the_doubt_of_a_mounting_is_a_warning_and_is_saved(tmp_path):
+    with pytest.warns(jb.DoubtfulWarning, match="a single lap bends by the lengths"):
+        history = jb.solve(OPEN.replace({"model.nodes": "auto"}))
+    history.save(tmp_path / "run.npz")
+    assert jb.read_history(tmp_path / "run.npz").doubts == history.doubts
+
+
+def test_one_overhang_leaves_the_other_open():
+    scene = OPEN.replace({"strip.overhang": 1.0})
+    history = jb.solve(scene, throw=False)
+    longer = jb.solve(scene.replace({"member.overhang": 2.0}), throw=False)
+    assert float(history.overhung) == pytest.approx(
+        float(longer.dissipation / history.dissipation), rel=1e-9
+    )
+
+
+def test_a_joint_that_is_driven_by_its_displacement_is_told_under_the_same_forces():
+    by_force = jb.solve(OPEN, throw=False)
+    driven = {"load.control": "displacement", "load.amplitude": by_force.peak_displacement}
+    history = jb.solve(OPEN.replace(driven), throw=False)
+    assert float(history.overhung) == pytest.approx(float(by_force.overhung), rel=0.01)
+    slides = jb.solve(OPEN.replace(driven | {"load.amplitude": 1e-3}), throw=False)
+    assert slides.overhung is None  # its force is that of gross slip with any overhangs
+
+
+def test_overhangs_change_nothing_where_the_loaded_end_may_deflect():
+    """The joint is statically determinate then."""
+    scene = OPEN.replace({"member.loaded_end": "free"})
+    history = jb.solve(scene, throw=False)
+    assert history.overhung is None
+    longer = jb.solve(with_overhangs(scene, 1.0), throw=False)
+    assert float(longer.dissipation) == pytest.approx(float(history.dissipation), rel=1e-3)
+
+
+def test_a_joint_that_nothing_loses_has_no_ratio():
+    run = jb.solve(with_overhangs(OPEN, 1.0), throw=False)
+    still = run.but(slip_work=0.0 * run.slip_work)
+    assert np.isinf(reliability.ratio_of_losses(run, still))
+    assert float(reliability.ratio_of_losses(still, still)) == 1.0
+    failed = run.but(status=run.status + 1)
+    assert np.isnan(reliability.ratio_of_losses(failed, run))
+    for ratio, words in ((np.inf, "and here it loses none"), (np.nan, "finds no equilibrium")):
+        doubted = jb.solve(OPEN, throw=False).but(overhung=np.asarray(ratio))
+        assert words in mounted(doubted)[0]
+
+
+def test_a_slender_lap_says_how_far_linear_kinematics_are_off_and_what_to_do():
+    slender = with_overhangs(OPEN.replace({"strip.height_ratio": 0.05}), 2.0)
+    (doubt,) = reliability.doubts_of_scene(slender)
+    assert doubt.endswith(
+        "a lap joint knows no others: allow for that error, or hold the joint nearer to its "
+        "overlap, by a smaller member.overhang and strip.overhang"
+    )
+    assert "load is 3.2 % of what buckles the joint" in doubt

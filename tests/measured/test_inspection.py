@@ -293,7 +293,8 @@ def test_what_all_amplitudes_show_is_said_once():
     u = rig.path(3, amplitudes=(0.4, 1.0))
     seen = inspect(rig.recorded(-rig.iwan(u), u, 0.005, driver="displacement"))
     (finding,) = seen.findings
-    assert finding.text.startswith("cycles to displacement = 1")
+    told = finding.text.removeprefix("cycles to displacement = ").split(":")[0]
+    assert float(told) == pytest.approx(1.0, rel=1e-3)  # its drive has noise of that size
 
 
 def test_the_picture_shows_the_recording_and_its_mean_loops():

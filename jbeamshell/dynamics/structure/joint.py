@@ -17,6 +17,7 @@ import warnings
 from pathlib import Path
 from typing import Any, ClassVar
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -38,6 +39,7 @@ from jbeamshell.dynamics.structure.steady_backbone import steady_backbone, walke
 from jbeamshell.laws.law import Law, as_path
 from jbeamshell.laws.parallel_iwan import NEARLY, ParallelIwan, backbone_points
 from jbeamshell.scene.domain import gross_slip_rule
+from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.scene import Scene
 
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
@@ -59,6 +61,7 @@ class Joint(ParallelIwan):
     sides : (2, k) displacements of a first pull and of a first push at the forces; None if they are
         the backbone's
     scene : scene on its contact line behind it, for `path_forces`; None if there is none
+    mounting : how a lap joint is held and loaded, in words; empty for any other joint
 
     Raises
     ------
@@ -80,6 +83,7 @@ class Joint(ParallelIwan):
     capacity: Any = np.inf
     sides: Any = None
     scene: Scene | None = None
+    mounting: str = eqx.field(static=True, default="")
 
     def __post_init__(self) -> None:
         for name in ("displacements", "forces"):
@@ -160,8 +164,10 @@ class Joint(ParallelIwan):
         bolted = scene.member.bolt_stiffness is not None  # which holds beyond
         capacity = np.inf if bolted else width * scene.gross_slip
         u, f, sides = steady_backbone(scene, as_leaf(force, "force"))
-        walked = scene if scene.plan.on_contact_line and not is_traced(scene, force) else None
-        return cls(u, width * f, width, capacity, sides, walked)
+        traced = is_traced(scene, force)
+        walked = scene if scene.plan.on_contact_line and not traced else None
+        mounting = "" if traced else in_words(scene)
+        return cls(u, width * f, width, capacity, sides, walked, mounting)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
@@ -201,7 +207,7 @@ class Joint(ParallelIwan):
         require_number("series stiffness", stiffness)
         more = self.forces / as_leaf(stiffness, "series stiffness")
         u, sides = self.displacements + more, None if self.sides is None else self.sides + more
-        return Joint(u, self.forces, self.width, self.capacity, sides)
+        return self.but(displacements=u, sides=sides, scene=None)
 
     @property
     def asymmetry(self) -> Array:
@@ -372,7 +378,8 @@ class Joint(ParallelIwan):
             rows.append(("gross slip", with_unit(float(self.capacity))))
         rows.append(("pull and push", f"differ from their mean by {float(self.asymmetry):.2%}"))
         rows.append(("width", with_unit(float(self.width))))
-        return Summary(f"joint of {count} slider{'s' * (count != 1)}", rows)
+        notes = [self.mounting] if self.mounting else []
+        return Summary(f"joint of {count} slider{'s' * (count != 1)}", rows, notes)
 
     def __str__(self) -> str:
         return self.summary.as_text()
