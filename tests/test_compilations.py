@@ -98,3 +98,12 @@ def test_a_response_is_made_of_traced_numbers_and_tables():
 
     found = jax.jit(dissipation)(0.12, table)
     assert float(found) == pytest.approx(float(dissipation(0.12, table)), rel=1e-9)
+
+
+def test_interpolated_bodies_are_built_by_one_program(compiled):
+    """Not operation by operation, and those that check them not by another."""
+    ask = jb.response(jb.Scene().replace({"model.nodes": 23}), ["strip.height_ratio"])
+    assert ask(0.1)["dissipation"] > 0.0
+    names = compiled()
+    assert names.count("jit(_built)") == 1
+    assert len(names) < 10

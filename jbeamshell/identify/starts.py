@@ -49,6 +49,7 @@ SIMILAR = 3.0  # factor of a force of gross slip within which the standard strip
 
 HEIGHT = ("strip.height_ratio", "strip.half_height")
 STIFFNESS = ("strip.axial_stiffness", "strip.youngs_modulus")
+PRESSURE = ("contact.pressure", "contact.bolts")
 
 
 class Estimate(NamedTuple):
@@ -160,7 +161,7 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
     if found.slides and "strip.far_end" not in values:
         take("strip.far_end", "free")
     length = float(scene_from_values(values).strip.length)
-    if found.normal is not None and found.normal > 0.0 and "contact.pressure" not in values:
+    if found.normal is not None and found.normal > 0.0 and not _pressed(values):
         take("contact.pressure", found.normal / length)
     scene = scene_from_values(values)
     _check_known(scene, values, found, forced)
@@ -178,7 +179,7 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         scene = scene_from_values(values)
         sliders = gross / found.short / length * float(scene.strip.half_height)
         take("contact.stick_stiffness", sliders / float(scene.strip.shear_modulus))
-    if "contact.pressure" not in values:
+    if not _pressed(values):
         take("contact.pressure", gross / (float(scene.contact.friction) * length))
     elif "contact.friction" not in values:
         take("contact.friction", gross / _pressing(scene))
@@ -193,9 +194,14 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
     return overridden(dict(known), fresh), notes
 
 
+def _pressed(values: Mapping[str, Any]) -> bool:
+    """True if the pressure is known, also by its bolts."""
+    return any(key in values for key in PRESSURE)
+
+
 def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, forced: bool) -> None:
     """Raise `InputError` if the friction and the pressure that are known are too small."""
-    if not (forced and "contact.friction" in values and "contact.pressure" in values):
+    if not (forced and "contact.friction" in values and _pressed(values)):
         return
     gross = float(scene.gross_slip)
     if found.peak >= BELOW * gross:
@@ -328,7 +334,7 @@ def _scene_of(known: Mapping[str, Any]) -> tuple[Scene, bool]:
 
 def _gross_slip(found: Estimate, scene: Scene, values: Mapping[str, Any], forced: bool) -> float:
     """Force of gross slip, mu F_N L."""
-    if "contact.friction" in values and "contact.pressure" in values:
+    if "contact.friction" in values and _pressed(values):
         return float(scene.gross_slip)
     force, x = found.force, _x(found)
     least = found.peak / MOST if forced else force

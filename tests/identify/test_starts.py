@@ -11,6 +11,7 @@ from jbeamshell.identify.starts import _beyond_bar, _x, estimate, started
 from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops
 from jbeamshell.measured.loops import make_loop
 from jbeamshell.measured.steady import steady_loops
+from jbeamshell.scene.toml import scene_from_values
 from tests import rig
 
 SI = {"force": "N/m", "displacement": "m"}
@@ -139,6 +140,15 @@ def test_friction_and_pressure_that_cannot_resist_are_refused_by_their_names():
     found = estimate([loop])
     values, _ = started({P: 10.0}, found._replace(si=True))
     assert values[MU] * 20.0 > 1.9
+
+
+def test_bolts_are_a_pressure_that_is_given():
+    found = estimate(example_loops(0.1126))._replace(si=True)
+    bolts = [[0.6, 7.0, 0.3], [1.4, 7.0, 0.3]]
+    values, notes = started({"strip.length": 2.0, "contact.bolts": bolts}, found)
+    assert P not in values
+    assert "pressure" not in " ".join(notes)
+    assert float(scene_from_values(values).gross_slip) == pytest.approx(14.0 * values[MU])
 
 
 def test_a_first_loading_has_a_start_too():

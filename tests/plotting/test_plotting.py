@@ -449,7 +449,10 @@ def test_labels_of_a_ring_down_do_not_touch(ratio):
     part = amplitude / amplitude[0]
     found = SimpleNamespace(amplitude=amplitude, frequency=90.0 - part, damping=0.05 * part)
     names = ("kinetic", "stored", "friction_work", "damping_work", "external_work")
-    motion = SimpleNamespace(time=time, displacement=time, **dict.fromkeys(names, time))
+    scene = jb.Scene()
+    motion = SimpleNamespace(
+        time=time, displacement=time, scene=scene, **dict.fromkeys(names, time)
+    )
     study = SimpleNamespace(found=found, predicted=found, motion=motion, payload=1.0)
     figure = plotting.ring_down_sheet(study)
     for axes in figure.axes[2:]:

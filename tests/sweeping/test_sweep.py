@@ -442,6 +442,20 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
     assert width({"contact.pressure": pressures[:5]}) == 8
 
 
+def test_bodies_are_interpolated_together_where_lanes_share_none():
+    scene, heights = jb.Scene().replace({"model.section": "plane"}), np.linspace(0.05, 0.3, 40)
+
+    def chunks(over, paired=False):
+        return job.Job(lanes_of(scene, over, paired), scene, ("dissipation",)).chunks
+
+    loads = np.linspace(0.1, 0.5, 40)
+    over = {"strip.height_ratio": heights, "load.amplitude": loads}
+    assert chunks(over, paired=True) == runner.Chunks(runner.APART, alike=False)
+    assert chunks(over | {"load.amplitude": loads[:16]}) == runner.Chunks(16, alike=True)
+    gap = {"strip.curvature": np.linspace(0.0, 1e-5, 40)}  # of which each is condensed
+    assert chunks(over | gap, paired=True).width == 1
+
+
 @pytest.mark.doubtful("few nodes")
 def test_lanes_of_plane_elasticity_share_their_bodies():
     """A grid whose heights share a body, beside the same strips paired at random."""
