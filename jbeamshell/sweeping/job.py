@@ -20,9 +20,16 @@ from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
-from jbeamshell.sweeping.runner import BLOCK, Block, Chunks, Runner, chunks_of, shared_keys
+from jbeamshell.sweeping.runner import (
+    BLOCK,
+    BLOCKS,
+    Block,
+    Chunks,
+    Runner,
+    chunks_of,
+    shared_keys,
+)
 
-BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
 LEAST = 8  # least lanes of a block that is worth a file
 MANY_BODIES = 32  # lanes from which on interpolated bodies are quicker than bodies of their own
 

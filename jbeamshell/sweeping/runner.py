@@ -29,6 +29,8 @@ from jbeamshell.sweeping.lanes import Lanes, Outcome
 
 ABREAST = 128  # most lanes of a chunk on a core, where they share a condensed body
 APART = 32  # lanes of a chunk whose bodies are interpolated together
+FEW = 8  # lanes that a chunk may have even if there are less than `BLOCKS` chunks then
+BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models that are kept
 PER_LANE = ("load.amplitude", "contact.pressure")
@@ -85,7 +87,8 @@ def chunks_of(scene: Scene, groups: np.ndarray, together: bool) -> Chunks:
     """
     if not scene.plan.on_contact_line:
         return Chunks(1 if on_processor() else BLOCK, alike=False)
-    widths = 2 ** np.arange(ABREAST.bit_length())
+    most = min(ABREAST, max(FEW, int(np.sum(groups)) // BLOCKS))
+    widths = 2 ** np.arange(most.bit_length())
     costs = [np.sum(-(-groups // width)) * (BODY + width) for width in widths]
     if together and 2.0 * np.sum(groups) < min(costs):
         return Chunks(APART, alike=False)
