@@ -174,7 +174,7 @@ def waves() -> Floats:
         x = np.linspace(0.0, LENGTH, 401)
         history = jb.solve(pressed(np.column_stack([x, 100.0 + 50.0 * np.cos(wave * x)]).tolist()))
         at = np.linspace(0.0, min(0.7 * LENGTH, LENGTH / count), 1001)  # away from the free end
-        reaction = np.interp(at, np.asarray(history.places), np.asarray(history.reaction[0]))
+        reaction = np.interp(at, np.asarray(history.x), np.asarray(history.reaction[0]))
         basis = np.column_stack([np.ones_like(at), np.cos(wave * at)])
         found.append(np.linalg.lstsq(basis, reaction, rcond=None)[0][1] / 50.0)
     return np.array(found)

@@ -31,6 +31,7 @@ from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.common.checks import as_leaf, is_traced, require, require_choice, require_number
 from jbeamshell.common.errors import Status, UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS
@@ -147,6 +148,8 @@ def solve_contact(
         half=steps if unit is not None and cycles is None else None,
     )
     levels, count, coarse = solver.solved(problem)
+    if not is_traced(levels):
+        levels, count, coarse = jax.device_get((levels, count, coarse))
     if problem.half is not None and not is_traced(levels):
         unit = unit_path(int(count), steps)
         levels = jax.tree.map(lambda a: a[: 1 + unit.size], levels)
@@ -179,13 +182,13 @@ def _history(
     upper, sound = problem.upper, levels.sound
     names = "loads", "displacements", "slip", "gap", "friction_force", "normal_force", "slip_work"
     values: dict[str, Array] = nan_unless(sound, {name: getattr(levels, name) for name in names})
-    return ContactHistory(
+    history = ContactHistory(
         places=upper.places,
         normals=upper.normals,
         tributary=upper.tributary,
         **values,
         slipping=levels.slipping,
-        status=jnp.where(sound, int(Status.CONVERGED), int(Status.MAX_ITERATIONS)),
+        status=numbers_of(sound).where(sound, int(Status.CONVERGED), int(Status.MAX_ITERATIONS)),
         error=levels.error,
         iterations=levels.iterations,
         friction=problem.friction,
@@ -195,6 +198,8 @@ def _history(
         assembly=problem.assembly,
         points=problem.points,
     )
+    # Figures of NumPy compile nothing.
+    return history if is_traced(history) else jax.device_get(history)
 
 
 def _demand(problem: Problem, levels: Levels) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +16,7 @@ from jbeamshell.bodies.face_step import TOLERANCE, Face, take_step
 from jbeamshell.bodies.joined import joined
 from jbeamshell.bodies.levels import Found, Levels
 from jbeamshell.common.checks import TINY, is_traced, require
+from jbeamshell.common.small import Small
 
 STEPS = 32  # per half cycle
 MOST_CYCLES = 16  # until the loop is steady
@@ -95,13 +96,14 @@ def solved(problem: Problem) -> Found:
     bodies, loads = Bodies.of(problem), problem.loads
     face = bodies.driven() if problem.control == "displacement" else bodies.face
     settings = problem.assembly == "frictional", problem.half
-    steps, count = _walk(face, loads, *settings, jnp.asarray(MOST_CYCLES))
-    levels = _in_levels(problem, bodies, steps)
+    steps, count = _walk((face, loads, jnp.asarray(MOST_CYCLES)), *settings)
+    levels = _in_levels((bodies, steps), problem.control)
     if problem.unit is None or is_traced(levels) or not bool(jnp.all(levels.sound)):
         return Found(levels, count)
     rests = loads.at[1::2].set(loads[:-1:2])  # rests between them: one program serves both
-    fewer, _ = _walk(face, rests, *settings, count)
-    coarse = _in_levels(problem, bodies, jax.tree.map(lambda a: a[::2], fewer))
+    fewer, _ = _walk((face, rests, count), *settings)
+    every_second = jax.tree.map(lambda a: np.asarray(a)[::2], fewer)
+    coarse = _in_levels((bodies, every_second), problem.control)
     return Found(levels, count, coarse)
 
 
@@ -121,37 +123,50 @@ def _on_surfaces(
     return series, found[:, size:], rest + (loads.T * soft) @ found[:, size:]
 
 
-@eqx.filter_jit
+@functools.partial(Small, level=0)
 def _walk(
-    face: Face, loads: Array, frictional: bool, half: int | None, most: Array
+    inputs: tuple[Face, Array, Array], frictional: bool, half: int | None
 ) -> tuple[Steps, Array]:
     """Levels of the path, and the number of cycles until it is steady, see `_until_steady`.
 
     The pressing, its first level (m,), is taken in steps.
+
+    Parameters
+    ----------
+    inputs : face, loads (levels, m), and most cycles
+    frictional : True if the face is pressed with friction
+    half : steps of half a cycle; None if all levels are taken
     """
-    start = jnp.zeros(face.held.shape)
+    face, loads, most = inputs
     parts = np.arange(1, PRESSING + 1) / PRESSING if frictional else np.ones(1)
-    smooth = face.pairs._replace(friction=jnp.zeros_like(face.pairs.friction))
-    pressing = face if frictional else face._replace(pairs=smooth)
-    first = _steps(pressing, start, jnp.asarray(parts)[:, None] * loads[0])
-    pressed = jax.tree.map(lambda a: a[-1:], first)._replace(
-        error=jnp.max(first.error, keepdims=True),
-        iterations=jnp.sum(first.iterations, keepdims=True),
+    last = parts.size - 1
+    cycles = 0 if half is None else 2 * half * MOST_CYCLES
+    rise = loads.shape[0] - cycles
+    ways = jnp.concatenate([jnp.asarray(parts)[:, None] * loads[0], loads[1:rise]])
+    # One loop for the pressing and for what comes then: each step compiles for seconds.
+    rubs = np.append(np.full(parts.size, float(frictional)), np.ones(rise - 1))
+    begins = np.arange(rubs.size) == parts.size
+    first = _steps(face, jnp.zeros(face.held.shape), ways, rubs, begins)
+    pressed = jax.tree.map(lambda a: a[last : last + 1], first)._replace(
+        error=jnp.max(first.error[: last + 1], keepdims=True),
+        iterations=jnp.sum(first.iterations[: last + 1], keepdims=True),
     )
+    levels = jax.tree.map(lambda a, b: jnp.concatenate([a, b[last + 1 :]]), pressed, first)
     if half is None:
-        rest, count = _steps(face, pressed.v[0], loads[1:]), jnp.asarray(0)
-    else:
-        rest, count = _until_steady(face, pressed.v[0], loads[1:], half, most)
-    return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), pressed, rest), count
-
-
-def _until_steady(
-    face: Face, begin: Array, loads: Array, half: int, most: Array
-) -> tuple[Steps, Array]:
-    """Levels of the first loading and of all cycles, and the number of those that were taken."""
-    rise = loads.shape[0] - 2 * half * MOST_CYCLES
-    first = _steps(face, begin, loads[:rise])
+        return levels, jnp.asarray(0)
     cycle = loads[rise : rise + 2 * half]
+    rest, count = _until_steady(face, jax.tree.map(lambda a: a[-1], first), cycle, most)
+    return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), levels, rest), count
+
+
+def _until_steady(face: Face, begin: Steps, cycle: Array, most: Array) -> tuple[Steps, Array]:
+    """Levels of all cycles, and the number of those that were taken.
+
+    Parameters
+    ----------
+    begin : level after the first loading
+    cycle : (levels, m) loads of a cycle
+    """
 
     def go(
         carry: tuple[Steps, Array], number: Array
@@ -159,7 +174,8 @@ def _until_steady(
         before, steady = carry
 
         def taken() -> Steps:
-            return _steps(face, before.v[-1], cycle)
+            none = np.zeros(cycle.shape[0])
+            return _steps(face, before.v[-1], cycle, none + 1.0, none > 0.0)
 
         now = lax.cond(steady, lambda: before, taken)
         ends = lax.stop_gradient(now.v[..., :2])
@@ -169,42 +185,55 @@ def _until_steady(
         ends_here = repeats | lost | (number + 1 >= most)
         return (now, steady | ends_here), (now, steady)
 
-    start = jax.tree.map(lambda a: jnp.broadcast_to(a[-1], (2 * half, *a.shape[1:])), first)
+    start = jax.tree.map(lambda a: jnp.broadcast_to(a, (cycle.shape[0], *a.shape)), begin)
     _, (cycles, copied) = lax.scan(go, (start, jnp.asarray(False)), jnp.arange(MOST_CYCLES))
-    flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:]), cycles)
-    levels = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), first, flat)
+    levels = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:]), cycles)
     return levels, jnp.sum(~copied)
 
 
-def _steps(face: Face, start: Array, loads: Array) -> Steps:
+def _steps(face: Face, start: Array, loads: Array, rubs: np.ndarray, begins: np.ndarray) -> Steps:
     """Levels of a path of loads (steps, m).
 
     The search for a level starts where the last step would lead if it went on.
+
+    Parameters
+    ----------
+    rubs : (steps,) part of the friction that acts
+    begins : (steps,) True where a path begins, so that nothing goes on
     """
 
-    def step(carry: tuple[Array, Array, Array], load: Array) -> tuple[Any, Steps]:
+    def step(
+        carry: tuple[Array, Array, Array], now: tuple[Array, Array, Array]
+    ) -> tuple[Any, Steps]:
+        load, rub, begin = now
         before, moved, last = carry
+        moved, last = (jnp.where(begin, 0.0, a) for a in (moved, last))
         further = load - last[0]
         rests = jnp.all(further == 0.0)
         goes_on = jnp.sum(further * last[1]) / jnp.maximum(jnp.sum(last[1] ** 2), TINY)
         guess = before + jnp.clip(goes_on, 0.0, 1.0) * moved
-        found = take_step(face, before, load, guess)
-        force = face.reaction(found.v, load)
+        pairs = face.pairs._replace(friction=rub * face.pairs.friction)
+        own = face._replace(pairs=pairs)
+        found = take_step(own, before, load, guess)
+        force = own.reaction(found.v, load)
         level = Steps(load, found.v, force, found.error, found.iterations)
         moved = jnp.where(rests, moved, found.v - before)
         return (found.v, moved, jnp.stack([load, jnp.where(rests, last[1], further)])), level
 
     still = jnp.zeros((2, loads.shape[1]))
-    return lax.scan(step, (start, jnp.zeros_like(start), still), loads)[1]
+    whole = loads, jnp.asarray(rubs), jnp.asarray(begins)
+    return lax.scan(step, (start, jnp.zeros_like(start), still), whole)[1]
 
 
-def _in_levels(problem: Problem, bodies: Bodies, steps: Steps) -> Levels:
+@functools.partial(Small, level=0)
+def _in_levels(inputs: tuple[Bodies, Steps], control: str) -> Levels:
     """Levels of steps, the displacements since the pressing."""
+    bodies, steps = inputs
     face, rest = bodies.face, bodies.flexibility
     count = steps.v.shape[0]
     moved = (steps.v - steps.v[0]).reshape(count, -1) @ face.loads
     loads = steps.load
-    if problem.control == "displacement":
+    if control == "displacement":
         others = rest[0, 1:] @ (loads[:, 1:] - loads[0, 1:]).T
         loads = loads.at[:, 0].set((loads[:, 0] - moved[:, 0] - others) / rest[0, 0])
     slip, normal = steps.v[..., :2] - steps.v[0, :, :2], steps.force[..., 2]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TypeVar
 
 import jax
-import jax.numpy as jnp
 from jax import Array
+
+from jbeamshell.common.numbers_of import numbers_of
 
 T = TypeVar("T")
 
@@ -14,14 +15,15 @@ T = TypeVar("T")
 def nan_unless(sound: Array, values: T) -> T:
     """Values with NaN where they are not sound, and their derivatives too.
 
-    With `jnp.where` the derivatives would be zero there, which is a plausible number.
+    With ``where`` the derivatives would be zero there, which is a plausible number.
 
     Parameters
     ----------
     sound : (...) True where the values hold
     values : pytree of arrays (..., any) of floating-point numbers
     """
-    factor = jnp.where(sound, 1.0, jnp.nan)
+    numbers = numbers_of(sound)
+    factor = numbers.where(sound, 1.0, numbers.nan)
 
     def masked(value: Array) -> Array:
         shape = *factor.shape, *[1] * (value.ndim - factor.ndim)

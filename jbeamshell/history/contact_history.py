@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_json, csv_text
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.error_estimates import grid_error
 from jbeamshell.history.figures import UNITS
@@ -147,7 +147,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     @property
     def touching(self) -> Array:
         """True if a node is in contact, (steps+1, n)."""
-        largest = jnp.max(self.normal_force, axis=-1, keepdims=True)
+        largest = self._numbers.max(self.normal_force, axis=-1, keepdims=True)
         return self.normal_force > TOUCHES * largest
 
     @property
@@ -159,7 +159,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     def slip_extent(self) -> Array:
         """Largest length, on a face area, that slipped in one step of the last cycle."""
         start, _, stop = self._last
-        return jnp.max(self.slipping[start + 1 : stop + 1] @ self._known_areas)
+        return self._numbers.max(self.slipping[start + 1 : stop + 1] @ self._known_areas)
 
     @property
     def dissipation(self) -> Array:
@@ -168,14 +168,14 @@ class ContactHistory(LoopFigures, eqx.Module):
         On a face it is the area of the loop.
         """
         if self.on_face:
-            return jnp.where(self._slips, self.dissipation_loop, 0.0)
-        return jnp.where(self._slips, super().dissipation, 0.0)
+            return self._numbers.where(self._slips, self.dissipation_loop, 0.0)
+        return self._numbers.where(self._slips, super().dissipation, 0.0)
 
     @property
     def dissipation_loop(self) -> Array:
         """Area of the last loop, with each branch integrated by parabolas; 0 if it is rounding."""
         area = super().dissipation_loop
-        return jnp.where(jnp.abs(area) > self._rounding, area, 0.0)
+        return self._numbers.where(self._numbers.abs(area) > self._rounding, area, 0.0)
 
     @property
     def closure(self) -> Array:
@@ -188,7 +188,7 @@ class ContactHistory(LoopFigures, eqx.Module):
         answer = displacement if self.control == "force" else force
         slips = self.slip[start : stop + 1].reshape(stop + 1 - start, -1)
         loop, slip = (_ends_apart(each) for each in (answer[:, None], slips))
-        return jnp.maximum(loop, jnp.where(self._slips, slip, 0.0))
+        return self._numbers.maximum(loop, self._numbers.where(self._slips, slip, 0.0))
 
     @property
     def _slips(self) -> Array:
@@ -201,7 +201,7 @@ class ContactHistory(LoopFigures, eqx.Module):
         """Largest work of the last cycle that is taken as zero."""
         force, displacement = self.loop
         least = NO_SLIP[2 if self.on_face else 1]
-        return least * jnp.ptp(force) * jnp.ptp(displacement)
+        return least * self._numbers.ptp(force) * self._numbers.ptp(displacement)
 
     @property
     def dissipation_error(self) -> Array:
@@ -212,43 +212,43 @@ class ContactHistory(LoopFigures, eqx.Module):
         dissipation; NaN if it was not estimated, and 0 if nothing slips.
         """
         if self.on_face:
-            change = jnp.nan if self.change is None else jnp.abs(self.change)
-            slips = self._slips
-            return jnp.where(slips, change / jnp.where(slips, self.dissipation, 1.0), 0.0)
+            change = self._numbers.nan if self.change is None else self._numbers.abs(self.change)
+            lost = self._numbers.where(self._slips, self.dissipation, 1.0)
+            return self._numbers.where(self._slips, change / lost, 0.0)
         return grid_error(self._friction_works)
 
     @property
     def sharing(self) -> Array:
         """Nodes that share the work of friction of the last cycle, W_i: (sum W_i)^2 / sum W_i^2."""
         work = self._friction_works
-        squares = jnp.sum(work**2)
-        return jnp.sum(work) ** 2 / jnp.where(squares > 0.0, squares, 1.0)
+        squares = self._numbers.sum(work**2)
+        return self._numbers.sum(work) ** 2 / self._numbers.where(squares > 0.0, squares, 1.0)
 
     @property
     def _friction_works(self) -> Array:
         """Work of friction (n,) of each node in the last cycle; zero where nothing slips."""
         start, _, stop = self._last
-        slip = jnp.diff(self.slip[start : stop + 1], axis=0)
+        slip = self._numbers.diff(self.slip[start : stop + 1], axis=0)
         if self.on_face:
             pull = self.friction_force[start : stop + 1]
-            return jnp.sum(0.5 * (pull[1:] + pull[:-1]) * slip, axis=(0, 2))
+            return self._numbers.sum(0.5 * (pull[1:] + pull[:-1]) * slip, axis=(0, 2))
         # Work at the limit: what is left of rounding in stuck nodes counts for nothing.
         cap = self.friction * self.normal_force[start : stop + 1]
-        path = jnp.abs(slip) * 0.5 * (cap[1:] + cap[:-1])
-        return jnp.where(self._slips, jnp.sum(path, axis=0), 0.0)
+        path = self._numbers.abs(slip) * 0.5 * (cap[1:] + cap[:-1])
+        return self._numbers.where(self._slips, self._numbers.sum(path, axis=0), 0.0)
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons to doubt this result, each a sentence with the size of the error and the fix."""
         if not self.converged:
             return ("a load found no equilibrium: that step and all after it hold NaN",)
-        wrong = float(jnp.max(self.error))
+        wrong = float(self._numbers.max(self.error))
         if wrong > OUT_OF_BALANCE:
             return (
                 f"forces are off by {wrong:.2g} of the largest reaction: the contact jumps where "
                 "much friction meets little stiffness; take a smaller amplitude or friction",
             )
-        if not self.cycles or not float(jnp.max(self.friction)) > 0.0:
+        if not self.cycles or not float(self._numbers.max(self.friction)) > 0.0:
             return ()
         return *self._unsteady, *self._coarse
 
@@ -268,7 +268,7 @@ class ContactHistory(LoopFigures, eqx.Module):
                     "or take a smaller amplitude, if it should stay",
                 )
             start, _, stop = self.cycles[-2]
-            last, before = self.dissipation, jnp.sum(self.slip_work[start + 1 : stop + 1])
+            last, before = self.dissipation, self._numbers.sum(self.slip_work[start + 1 : stop + 1])
             percent = 100.0 * abs(float(last / before) - 1.0) if before > 0.0 else 100.0
             said += f", and the dissipation changed by {percent:.3g} % since the cycle before"
         return (f"{said}; leave cycles out, or take more than {count}",)
@@ -304,13 +304,13 @@ class ContactHistory(LoopFigures, eqx.Module):
         values = {name: float(getattr(self, name)) for name in FIGURES if self.cycles}
         extent = "area" if self.on_face else "length"
         if self.tributary is None:
-            values["normal_force_max"] = float(jnp.max(self.normal_force[-1]))
+            values["normal_force_max"] = float(self._numbers.max(self.normal_force[-1]))
         else:
-            values["reaction_max"] = float(jnp.max(self.reaction[-1]))
+            values["reaction_max"] = float(self._numbers.max(self.reaction[-1]))
             values[f"contact_{extent}"] = float(self.contact_extent[-1])
             if self.cycles:
                 values[f"slip_{extent}"] = float(self.slip_extent)
-        values["opening_max"] = float(jnp.max(self.gap))
+        values["opening_max"] = float(self._numbers.max(self.gap))
         found: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         return found | {"assembly": self.assembly, "doubts": list(self.doubts)}
 
@@ -413,6 +413,7 @@ def _by_ways(name: str, values: Array) -> dict[str, Array]:
 
 def _ends_apart(values: Array) -> Array:
     """Largest distance between the ends of lines (levels, lines) over the largest range."""
-    width = jnp.max(jnp.ptp(values, axis=0))
-    apart = jnp.max(jnp.abs(values[-1] - values[0]))
-    return apart / jnp.where(width > 0.0, width, 1.0)
+    numbers = numbers_of(values)
+    width = numbers.max(numbers.ptp(values, axis=0))
+    apart = numbers.max(numbers.abs(values[-1] - values[0]))
+    return apart / numbers.where(width > 0.0, width, 1.0)

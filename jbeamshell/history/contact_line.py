@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.history.record import Record
 
 
@@ -16,7 +17,7 @@ class ContactLine(Record):
     def touching(self) -> Array:
         """True if a node is in contact, (steps+1, n)."""
         if self.scene.contact.normal == "none":
-            return jnp.zeros(self.gap.shape, bool)
+            return numbers_of(self.gap).zeros(self.gap.shape, bool)
         if self.scene.contact.normal == "compliant":
             return self.gap <= 0.0
         strip = self.scene.strip  # the weight of `jbeamshell.mechanics.normal_contact.Rigid`
@@ -38,17 +39,17 @@ class ContactLine(Record):
 
         In plane elasticity it may lie in the corner of a body, where it grows with the mesh.
         """
-        return jnp.max(self.reaction, axis=1)
+        return numbers_of(self.reaction).max(self.reaction, axis=1)
 
     @property
     def reaction_max_at(self) -> Array:
         """Position X of the largest normal reaction, (steps+1,)."""
-        return self.x[jnp.argmax(self.reaction, axis=1)]
+        return self.x[numbers_of(self.reaction).argmax(self.reaction, axis=1)]
 
     @property
     def reaction_min(self) -> Array:
         """Smallest normal reaction of the path, stress; negative is tension (w frozen)."""
-        return jnp.min(self.reaction)
+        return numbers_of(self.reaction).min(self.reaction)
 
 
 @jax.jit

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -35,6 +34,7 @@ class CycleFigures(Record, LoopFigures):
     """
 
     @property
+    @np.errstate(divide="ignore", invalid="ignore")
     def dissipation_ratio(self) -> Array:
         """Dissipation over that of the one-dimensional bar, (2/3) A^3/(E'2H q) (Goodman 1959).
 
@@ -43,22 +43,24 @@ class CycleFigures(Record, LoopFigures):
         """
         scene, force = self.scene, self.loop[0]
         if scene.load.kind == "moment":
-            return jnp.full_like(self.dissipation, jnp.nan)
+            return self._numbers.full_like(self.dissipation, self._numbers.nan)
         stiffness, friction = scene.strip.stretching_stiffness, self.friction_per_length
-        amplitude = 0.5 * (jnp.max(force) - jnp.min(force))
+        amplitude = 0.5 * (self._numbers.max(force) - self._numbers.min(force))
         if scene.member.support == "none":
             return self.dissipation / cubic_law(amplitude, stiffness, friction)
         lower = scene.member.beside(scene.strip).stretching_stiffness
         return self.dissipation / lap_cubic_law(amplitude, stiffness, lower, friction)
 
     @property
+    @np.errstate(divide="ignore", invalid="ignore")
     def friction_per_length(self) -> Array:
         """Mean q of mu F_N where the strip is pressed, force per length and width."""
         # Weighted by the pressure itself, so that unloaded parts do not count.
-        mean = jnp.sum(self.load**2 / self.tributary) / jnp.sum(self.load)
+        mean = self._numbers.sum(self.load**2 / self.tributary) / self._numbers.sum(self.load)
         return self.scene.contact.friction * mean
 
     @property
+    @np.errstate(divide="ignore", invalid="ignore")
     def closure(self) -> Array:
         """Distance from the start to the end of the last loop over its width; 0 when steady."""
         force, displacement = self.loop
@@ -69,7 +71,7 @@ class CycleFigures(Record, LoopFigures):
     def slip_length(self) -> Array:
         """Largest length of contact that slipped in one step of the last cycle."""
         start, _, stop = self._last
-        return jnp.max(self.slipping[start + 1 : stop + 1] @ self.tributary)
+        return self._numbers.max(self.slipping[start + 1 : stop + 1] @ self.tributary)
 
     @property
     def slip_cycle(self) -> SlipCycle:
@@ -108,4 +110,4 @@ class CycleFigures(Record, LoopFigures):
         Rather too large than too small; infinite if nothing slips.  Of a refined grid it is at
         least the change by the last halving of the elements.  See `History.doubts`.
         """
-        return jnp.max(jnp.stack(self.errors))
+        return self._numbers.max(self._numbers.stack(self.errors))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import functools
 from typing import Any, Self
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -56,9 +54,10 @@ class History(Profiles, ContactLine, CycleFigures):
         The work includes that of changing pressures.  Works are trapezoids over the load steps.
         """
         force, sinking = (0.5 * (a[1:] + a[:-1]) for a in (self.force, self.sinking))
-        work = jnp.cumsum(force * jnp.diff(self.displacement) + sinking * jnp.diff(self.pressure))
-        kept = self.stored_energy - self.stored_energy[0] + jnp.cumsum(self.slip_work)
-        return jnp.append(0.0, work) - kept
+        numbers = self._numbers
+        pulled, sank = (numbers.diff(a) for a in (self.displacement, self.pressure))
+        work = numbers.append(0.0, numbers.cumsum(force * pulled + sinking * sank))
+        return work - (self.stored_energy - self.stored_energy[0] + numbers.cumsum(self.slip_work))
 
     @property
     def converged(self) -> bool:
@@ -90,7 +89,8 @@ class History(Profiles, ContactLine, CycleFigures):
         of_cycle = [name for name in FIGURES if not (turned and name == "dissipation_ratio")]
         names = (*(of_cycle if self.cycles else ()), *self._contact_figures)
         read = self.but(above=self.above.found, scene=self.scene.in_one_form())
-        values = {name: float(value) for name, value in _last_values(read, names).items()}
+        plain = jax.tree.map(np.asarray, read)
+        values = {name: float(np.ravel(getattr(plain, name))[-1]) for name in names}
         figures: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         figures["newton_iterations"] = int(np.sum(np.asarray(self.iterations)))
         figures["status"] = worst.name.lower()
@@ -226,9 +226,3 @@ class History(Profiles, ContactLine, CycleFigures):
         from jbeamshell import plotting
 
         return plotting.animate(self, steps, **options)
-
-
-@eqx.filter_jit
-def _last_values(history: History, names: tuple[str, ...]) -> dict[str, Array]:
-    """Values of figures; of one that has a value for every step, the last."""
-    return {name: jnp.ravel(getattr(history, name))[-1] for name in names}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.numerics.cycles import branch_work
 
 
@@ -33,6 +34,11 @@ class LoopFigures:
         cycles: tuple[tuple[int, int, int], ...]
 
     @property
+    def _numbers(self) -> Any:
+        """NumPy for its arrays, `jax.numpy` for those of JAX."""
+        return numbers_of(self.slip_work)
+
+    @property
     def _last(self) -> tuple[int, int, int]:
         """Steps at the start, the turn and the end of the last cycle."""
         if not self.cycles:
@@ -52,7 +58,7 @@ class LoopFigures:
     def dissipation(self) -> Array:
         """Work of friction in the last cycle, D, per unit width."""
         start, _, stop = self._last
-        return jnp.sum(self.slip_work[start + 1 : stop + 1])
+        return self._numbers.sum(self.slip_work[start + 1 : stop + 1])
 
     @property
     def dissipation_loop(self) -> Array:
@@ -63,18 +69,21 @@ class LoopFigures:
         return there + back
 
     @property
+    @np.errstate(divide="ignore", invalid="ignore")
     def secant_stiffness(self) -> Array:
         """Range of force over range of displacement of the last loop."""
         force, displacement = self.loop
-        return jnp.ptp(force) / jnp.ptp(displacement)
+        return self._numbers.ptp(force) / self._numbers.ptp(displacement)
 
     @property
+    @np.errstate(divide="ignore", invalid="ignore")
     def loss_factor(self) -> Array:
         """Loss factor D/(2 pi W), with W the energy of the secant stiffness at the amplitude."""
         force, displacement = self.loop
-        return self.dissipation / (2.0 * jnp.pi * jnp.ptp(force) * jnp.ptp(displacement) / 8.0)
+        ranges = self._numbers.ptp(force) * self._numbers.ptp(displacement)
+        return self.dissipation / (2.0 * np.pi * ranges / 8.0)
 
     @property
     def peak_displacement(self) -> Array:
         """Largest abs(u(L)) of the last loop, length."""
-        return jnp.max(jnp.abs(self.loop[1]))
+        return self._numbers.max(self._numbers.abs(self.loop[1]))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.history.record import Record
 
 
@@ -47,7 +47,8 @@ class Profiles(Record):
     @property
     def squeeze_stress_max(self) -> Array:
         """Largest compression chi/(2H) of any element, (steps+1,), positive."""
-        return jnp.max(-self.squeeze_stress, axis=1)
+        stress = self.squeeze_stress
+        return numbers_of(stress).max(-stress, axis=1)
 
     @property
     def squeeze_couple(self) -> Array:

@@ -21,6 +21,8 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from jbeamshell.common.numbers_of import numbers_of
+
 
 def bar_backbone(
     force: ArrayLike, axial_stiffness: ArrayLike, friction_per_length: ArrayLike
@@ -152,7 +154,8 @@ def cubic_law(
     -----
     Goodman 1959.
     """
-    return 2 / 3 * jnp.power(amplitude, 3) / axial_stiffness / friction_per_length
+    cubed = numbers_of(amplitude).power(amplitude, 3)
+    return 2 / 3 * cubed / axial_stiffness / friction_per_length
 
 
 def lap_backbone(
@@ -222,5 +225,5 @@ def lap_cubic_law(
 
 def _in_series(upper: ArrayLike, lower: ArrayLike) -> Array:
     """Stiffness of one bar that slips as much as two that lap."""
-    k_1, k_2 = jnp.asarray(upper), jnp.asarray(lower)
+    k_1, k_2 = (numbers_of(k).asarray(k) for k in (upper, lower))
     return k_1 * k_2 * (k_1 + k_2) ** 2 / (k_1**3 + k_2**3)

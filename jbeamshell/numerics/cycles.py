@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
+
+from jbeamshell.common.numbers_of import numbers_of
 
 
 def branch_work(force: Array, displacement: Array) -> Array:
@@ -19,7 +20,8 @@ def branch_work(force: Array, displacement: Array) -> Array:
     f, u = force[: even + 1], displacement[: even + 1]
     f0, f1, f2, u0, u1, u2 = f[:-2:2], f[1::2], f[2::2], u[:-2:2], u[1::2], u[2::2]
     at0, at1, at2 = -1.5 * u0 + 2.0 * u1 - 0.5 * u2, 0.5 * (u2 - u0), 0.5 * u0 - 2.0 * u1 + 1.5 * u2
-    work = jnp.sum(f0 * at0 + 4.0 * f1 * at1 + f2 * at2) / 3.0  # Simpson's rule on F du/dstep
+    # Simpson's rule on F du/dstep.
+    work = numbers_of(force).sum(f0 * at0 + 4.0 * f1 * at1 + f2 * at2) / 3.0
     if even + 1 < force.shape[0]:
         work = work + 0.5 * (force[-2] + force[-1]) * (displacement[-1] - displacement[-2])
     return work

@@ -31,6 +31,23 @@ def block():
     return jb.Substructure.read(data_folder() / "calculix_block.npz")
 
 
+START = {"friction": 0.3, "bolts": 10.0, "gap": 1.0, "softness": 1e-6, "roughness": 1e-5}
+
+
+def work_of_friction(values):
+    """Work along a loop of the block, of numbers in the order of `START`."""
+    inputs = dict(zip(START, values, strict=True))
+    inputs["gap"] = inputs["gap"] * 1e-7 * (block().places[:, 0] - 20.0) ** 2  # a wedge
+    inputs["roughness"] = inputs["roughness"] * jnp.array([1.0, 1e6])
+    options = {"amplitude": 700.0, "cycles": 1, "steps_per_half_cycle": 8, "throw": False}
+    return jnp.sum(jb.solve_contact(block(), **inputs, **options).slip_work)
+
+
+# One program each for all numbers.
+WORK, SLOPES = jax.jit(work_of_friction), jax.jit(jax.grad(work_of_friction))
+FORWARD = jax.jit(lambda at, way: jax.jvp(work_of_friction, (at,), (way,))[1])
+
+
 class TestPoint:
     def test_a_dragged_slider_loses_what_the_closed_form_says(self):
         # A spring of force mu N drags it on a circle, along its own direction.
@@ -199,25 +216,13 @@ class TestBlock:
         )
         np.testing.assert_allclose(found.force, forces.force, atol=1e-5)
 
-    @pytest.mark.parametrize("key", ["friction", "bolts", "gap", "softness", "roughness"])
+    @pytest.mark.parametrize("key", START)
     def test_derivatives_have_the_slope_of_taylor(self, key):
-        start = {"friction": 0.3, "bolts": 10.0, "gap": 1.0, "softness": 1e-6, "roughness": 1e-5}
-        options = {"amplitude": 700.0, "cycles": 1, "steps_per_half_cycle": 8, "throw": False}
-
-        def work(value):
-            inputs = start | {key: value}
-            wedge = 1e-7 * (block().places[:, 0] - 20.0) ** 2
-            inputs["gap"] *= wedge
-            inputs["roughness"] = inputs["roughness"] * jnp.array([1.0, 1e6])
-            history = jb.solve_contact(block(), **inputs, **options)
-            return jnp.sum(history.slip_work)
-
-        value = jnp.asarray(start[key])
-        slope = jax.grad(work)(value)
-        forward = jax.jvp(work, (value,), (jnp.ones_like(value),))[1]
-        assert float(forward) == pytest.approx(float(slope), rel=1e-9)
-        steps = value * np.array([1e-4, 5e-5])
-        left = [abs(float(work(value + h) - work(value) - slope * h)) for h in steps]
+        start, way = jnp.asarray(list(START.values())), jnp.zeros(len(START))
+        way = way.at[list(START).index(key)].set(START[key])
+        slope = SLOPES(start) @ way
+        assert float(FORWARD(start, way)) == pytest.approx(float(slope), rel=1e-9)
+        left = [abs(float(WORK(start + h * way) - WORK(start) - slope * h)) for h in (1e-4, 5e-5)]
         assert left[1] < 0.3 * left[0]
 
 

@@ -139,7 +139,8 @@ def test_a_law_is_driven_by_force_where_it_has_masings_memory():
     by_force = {"load.control": "force"}
     fit = identify.fit(Specimen(laws.Mindlin(1.2, 80.0), data, set=by_force))
     assert fit.values["mindlin.stiffness"] == pytest.approx(100.0, rel=1e-6)
-    with pytest.raises(InputError, match=r"^load.control = 'force': dahl is driven by the displac"):
+    said = r"^law driven by the force = 'dahl': follows displacements alone"
+    with pytest.raises(InputError, match=said):
         identify.fit(Specimen(laws.Dahl(1.2, 80.0), data, set=by_force))
     with pytest.raises(
         InputError, match=r"^force = 0.8: reaches gross slip of mindlin at the star"
