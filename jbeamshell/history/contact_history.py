@@ -14,7 +14,7 @@ from jax import Array
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_json, csv_text
-from jbeamshell.common.numbers_of import numbers_of
+from jbeamshell.common.numbers_of import numbers_of, quiet
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.error_estimates import grid_error
 from jbeamshell.history.figures import UNITS
@@ -162,6 +162,7 @@ class ContactHistory(LoopFigures, eqx.Module):
         return self._numbers.max(self.slipping[start + 1 : stop + 1] @ self._known_areas)
 
     @property
+    @quiet
     def dissipation(self) -> Array:
         """Work of friction in the last cycle, D; 0 if it is rounding.
 
@@ -172,12 +173,14 @@ class ContactHistory(LoopFigures, eqx.Module):
         return self._numbers.where(self._slips, super().dissipation, 0.0)
 
     @property
+    @quiet
     def dissipation_loop(self) -> Array:
         """Area of the last loop, with each branch integrated by parabolas; 0 if it is rounding."""
         area = super().dissipation_loop
         return self._numbers.where(self._numbers.abs(area) > self._rounding, area, 0.0)
 
     @property
+    @quiet
     def closure(self) -> Array:
         """Distance between the ends of the last cycle over its width; 0 when steady.
 
@@ -191,12 +194,14 @@ class ContactHistory(LoopFigures, eqx.Module):
         return self._numbers.maximum(loop, self._numbers.where(self._slips, slip, 0.0))
 
     @property
+    @quiet
     def _slips(self) -> Array:
         """True if slip in the last cycle is more than rounding."""
         lost = self.dissipation_loop if self.on_face else super().dissipation
         return lost > self._rounding
 
     @property
+    @quiet
     def _rounding(self) -> Array:
         """Largest work of the last cycle that is taken as zero."""
         force, displacement = self.loop
@@ -204,6 +209,7 @@ class ContactHistory(LoopFigures, eqx.Module):
         return least * self._numbers.ptp(force) * self._numbers.ptp(displacement)
 
     @property
+    @quiet
     def dissipation_error(self) -> Array:
         """Estimated relative error of the dissipation.
 
@@ -218,6 +224,7 @@ class ContactHistory(LoopFigures, eqx.Module):
         return grid_error(self._friction_works)
 
     @property
+    @quiet
     def sharing(self) -> Array:
         """Nodes that share the work of friction of the last cycle, W_i: (sum W_i)^2 / sum W_i^2."""
         work = self._friction_works
@@ -225,6 +232,7 @@ class ContactHistory(LoopFigures, eqx.Module):
         return self._numbers.sum(work) ** 2 / self._numbers.where(squares > 0.0, squares, 1.0)
 
     @property
+    @quiet
     def _friction_works(self) -> Array:
         """Work of friction (n,) of each node in the last cycle; zero where nothing slips."""
         start, _, stop = self._last

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import quiet
 from jbeamshell.history.error_estimates import SlipCycle, estimates
 from jbeamshell.history.loop_figures import LoopFigures
 from jbeamshell.history.record import Record
@@ -34,7 +35,7 @@ class CycleFigures(Record, LoopFigures):
     """
 
     @property
-    @np.errstate(divide="ignore", invalid="ignore")
+    @quiet
     def dissipation_ratio(self) -> Array:
         """Dissipation over that of the one-dimensional bar, (2/3) A^3/(E'2H q) (Goodman 1959).
 
@@ -52,7 +53,7 @@ class CycleFigures(Record, LoopFigures):
         return self.dissipation / lap_cubic_law(amplitude, stiffness, lower, friction)
 
     @property
-    @np.errstate(divide="ignore", invalid="ignore")
+    @quiet
     def friction_per_length(self) -> Array:
         """Mean q of mu F_N where the strip is pressed, force per length and width."""
         # Weighted by the pressure itself, so that unloaded parts do not count.
@@ -60,7 +61,7 @@ class CycleFigures(Record, LoopFigures):
         return self.scene.contact.friction * mean
 
     @property
-    @np.errstate(divide="ignore", invalid="ignore")
+    @quiet
     def closure(self) -> Array:
         """Distance from the start to the end of the last loop over its width; 0 when steady."""
         force, displacement = self.loop

@@ -11,6 +11,7 @@ from jax import Array
 
 from jbeamshell.common.errors import Status
 from jbeamshell.common.frames import frame
+from jbeamshell.common.numbers_of import quiet
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
@@ -48,6 +49,7 @@ class History(Profiles, ContactLine, CycleFigures):
     """
 
     @property
+    @quiet
     def energy_imbalance(self) -> Array:
         """External work less stored and dissipated energy since the first step, (steps+1,).
 
@@ -75,6 +77,7 @@ class History(Profiles, ContactLine, CycleFigures):
         """Reasons to doubt this run, each a sentence with the size of the error and the remedy."""
         return doubts_of_run(self.plain)
 
+    @quiet
     def figures(self) -> dict[str, Any]:
         """Figures of the last cycle and of the contact at the last step, as plain numbers.
 

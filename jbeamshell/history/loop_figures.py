@@ -8,7 +8,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.common.numbers_of import numbers_of
+from jbeamshell.common.numbers_of import numbers_of, quiet
 from jbeamshell.numerics.cycles import branch_work
 
 
@@ -61,6 +61,7 @@ class LoopFigures:
         return self._numbers.sum(self.slip_work[start + 1 : stop + 1])
 
     @property
+    @quiet
     def dissipation_loop(self) -> Array:
         """Area of the last loop, with each branch integrated by parabolas."""
         start, turn, stop = self._last
@@ -69,14 +70,14 @@ class LoopFigures:
         return there + back
 
     @property
-    @np.errstate(divide="ignore", invalid="ignore")
+    @quiet
     def secant_stiffness(self) -> Array:
         """Range of force over range of displacement of the last loop."""
         force, displacement = self.loop
         return self._numbers.ptp(force) / self._numbers.ptp(displacement)
 
     @property
-    @np.errstate(divide="ignore", invalid="ignore")
+    @quiet
     def loss_factor(self) -> Array:
         """Loss factor D/(2 pi W), with W the energy of the secant stiffness at the amplitude."""
         force, displacement = self.loop
