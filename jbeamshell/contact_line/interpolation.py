@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line.body import Body, Unknown
@@ -91,7 +92,7 @@ class Bodies(Tree):
 
     def _body(self, height: Any, poisson: Any) -> Body:
         """Body at a height ratio's logarithm and -ln(1 - 2 nu), of NumPy's arrays or of JAX's."""
-        numbers: Any = np if isinstance(height, np.floating) else jnp
+        numbers = numbers_of(height)
         at = numbers.stack([height, poisson])
         span = numbers.where(self.high > self.low, self.high - self.low, 1.0)
         at = 2.0 * (at - self.low) / span - 1.0

@@ -169,7 +169,7 @@ def _interpolated(
 
 
 def _built(build: Callable[[], R]) -> R:
-    """What a function builds in double precision, also while another function is traced."""
+    """Result of a function in double precision, also while another function is traced."""
 
     @on_one_core
     def precise() -> R:

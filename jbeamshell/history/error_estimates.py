@@ -10,12 +10,12 @@ finer the grid.  And load steps may be so long that the reaction changes much wi
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.scene.scene import Scene
 
@@ -74,7 +74,7 @@ def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
     -------
     grid, corner : scalars; infinite if nothing slips
     """
-    numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
+    numbers = numbers_of(cycle.v)
     slip, cap = slip_and_cap(cycle)
     work = numbers.sum(slip * cap, axis=0) * cycle.tributary
     total = numbers.sum(work)
@@ -100,7 +100,7 @@ def grid_error(work: Array, dissipation: Array | None = None) -> Array:
     The dissipation is the sum of that work if it is not known, or larger; see
     `dissipation_errors`.
     """
-    numbers: Any = np if isinstance(work, np.ndarray) else jax.numpy
+    numbers = numbers_of(work)
     total = numbers.sum(work)
     if dissipation is not None:
         total = numbers.minimum(total, dissipation)
@@ -112,7 +112,7 @@ def grid_error(work: Array, dissipation: Array | None = None) -> Array:
 
 def slip_and_cap(cycle: SlipCycle) -> tuple[Array, Array]:
     """Amounts of slip (levels - 1, n) in each step of a cycle, and the mean caps there."""
-    numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
+    numbers = numbers_of(cycle.v)
     cap = coulomb_cap(cycle.friction, cycle.reaction)
     cap = 0.5 * (cap[1:] + cap[:-1])
     elastic = numbers.diff(cycle.traction, axis=0) / cycle.slip_stiffness
@@ -135,7 +135,7 @@ def step_error(cycle: SlipCycle) -> Array:
     -------
     scalar, zero if nothing slips
     """
-    numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
+    numbers = numbers_of(cycle.v)
     slip, cap = slip_and_cap(cycle)
     change = numbers.abs(numbers.diff(coulomb_cap(cycle.friction, cycle.reaction), axis=0))
     changed, work = (numbers.sum(slip @ cycle.tributary) for slip in (slip * change, slip * cap))
@@ -155,7 +155,7 @@ def slider_error(cycle: SlipCycle) -> Array:
     -------
     scalar, zero if sliders are rigid until they slip
     """
-    numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
+    numbers = numbers_of(cycle.v)
     if numbers is np and np.all(np.isinf(cycle.slip_stiffness)):
         return np.zeros(())  # type: ignore[return-value]
     beside = numbers.pad(cycle.reaction, ((0, 0), (1, 1)))
@@ -184,7 +184,7 @@ def singular_corner_error(scene: Scene, cycle: SlipCycle) -> Array:
     -------
     scalar, infinite if nothing slips
     """
-    numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
+    numbers = numbers_of(cycle.v)
     slips = numbers.any(slip_and_cap(cycle)[0] > 0.0, axis=0)
     zone = numbers.sum(slips * cycle.tributary)
     element = (cycle.x[-1] - cycle.x[-2]) * (1.0 if scene.member.support == "none" else 2.0)
@@ -211,7 +211,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     (measured by verification/campaign.py).
     """
     grid, corner = dissipation_errors(cycle)
-    numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
+    numbers = numbers_of(cycle.v)
     plane = scene.plan.elastic
     rule = _factor(scene) * grid
     grid = rule if change is None else numbers.maximum(change, REFINED * grid)

@@ -39,7 +39,8 @@ class History(Profiles, ContactLine, CycleFigures):
 
     Its arrays are the attributes of `Record`.  Figures are properties: those of `Profiles` along X,
     of `ContactLine` at every step, of `CycleFigures` for the last cycle, and those below.  Units
-    are those of the scene; forces, works and stiffnesses are per unit width.
+    are those of the scene; forces, works and stiffnesses are per unit width.  A run on the contact
+    line has arrays of NumPy, and within a transformation those of JAX.
 
     Examples
     --------

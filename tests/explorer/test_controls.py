@@ -61,7 +61,7 @@ def test_a_bolt_keeps_its_width_where_it_goes_and_presses_both_faces():
 
 @pytest.mark.parametrize("stiffness", ["strip.youngs_modulus", "strip.axial_stiffness"])
 def test_the_slider_of_the_height_keeps_the_stiffness_and_the_form_that_were_given(stiffness):
-    """What was given as E and H stays E, and the slider moves H."""
+    """Young's modulus and H were given: E stays, and the slider moves H."""
     given = {"strip.length": 120.0, "strip.half_height": 6.0, stiffness: 2e6}
     scene = jb.Scene().replace(given | {"load.amplitude": 100.0})
     height = controls_of(scene)[0]

@@ -23,7 +23,7 @@ def test_intervals_of_planted_fits_hold_and_nothing_is_biased():
 
 
 def test_no_number_of_its_own_is_biased():
-    """Of friction, stiffness and so on, in the mean over all fits of it."""
+    """Mean error of friction, of stiffness and of each other number, over all its fits."""
     off: dict[str, list[float]] = {}
     for kind in noise_both.COUNTS:
         for row in RECORD[kind]["rows"]:

@@ -380,7 +380,7 @@ def test_a_sweep_that_was_cut_off_goes_on(tmp_path):
     [("strip.half_height", (4.0, 8.0)), ("strip.length", (90.0, 150.0))],
 )
 def test_a_sweep_of_a_strip_given_by_e_and_h_goes_on(key, numbers, tmp_path):
-    """What was given stays given in the lanes of a store, and after an interruption."""
+    """Given numbers stay given in the lanes of a store, and after an interruption."""
     given = {"strip.length": 120.0, "strip.half_height": 6.0, "strip.youngs_modulus": 210e3}
     given |= {"contact.friction": 0.2, "load.amplitude": 120.0, "load.cycles": 1}
     given |= {"model.section": "squeeze", "model.nodes": 9, "model.kinematics": "linear"}
