@@ -218,22 +218,19 @@ def test_without_data_the_example_is_fitted(asked):
     assert scene.load.amplitude == 1.6
 
 
-@pytest.mark.parametrize(
-    ("words", "start"),
-    [
-        (["--free", "contact.friction"], [0.15, 0.1126]),
-        (["--free", "strip.kappa_s"], [0.1, 0.1126]),
-        (["--set", "contact.friction=0.3"], [0.3, 0.2]),
-        (["--set", "contact.friction=0.3", "--start", "contact.friction=0.4"], [0.4, 0.2]),
-        (["--set", "strip.half_height=0.05"], [0.15, 0.05]),
-        (["--start", "strip.height_ratio=0.3", "--set", "strip.half_height=0.05"], [0.15, 0.3]),
-    ],
-)
-def test_starts_go_before_settings_before_the_example(asked, words, start):
-    assert numbers(asked(*words)[1]) == start
+STARTS = [
+    (["--free", "contact.friction"], [0.15, 0.1126]),
+    (["--free", "strip.kappa_s"], [0.1, 0.1126]),
+    (["--set", "contact.friction=0.3"], [0.3, 0.2]),
+    (["--set", "contact.friction=0.3", "--start", "contact.friction=0.4"], [0.4, 0.2]),
+    (["--set", "strip.half_height=0.05"], [0.15, 0.05]),
+    (["--start", "strip.height_ratio=0.3", "--set", "strip.half_height=0.05"], [0.15, 0.3]),
+]
 
 
-def test_a_scene_file_goes_before_the_example(asked, tmp_path):
+def test_starts_go_before_settings_before_files_before_the_example(asked, tmp_path):
+    for words, start in STARTS:
+        assert numbers(asked(*words)[1]) == start
     scene = tmp_path / "scene.toml"
     scene.write_text("[contact]\nfriction = 0.25\n[load]\namplitude = 0.5\n")
     got = asked("--scene", scene)[1]

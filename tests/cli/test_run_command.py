@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-import re
 import sys
 
 import numpy as np
@@ -77,15 +76,19 @@ SPECIMEN = ["--length", "120mm", "--thickness", "12mm", "--modulus", "210GPa", "
 
 
 @pytest.mark.doubtful("slip")
-def test_run_takes_a_specimen_and_settings_with_units(cli, tmp_path):
-    folder = tmp_path / "out"
+def test_run_takes_a_specimen_and_a_reader_that_leaves_early_costs_no_files(monkeypatch, tmp_path):
+    folder, (reading, writing) = tmp_path / "out", os.pipe()
+    os.close(reading)
     load = ["--pressure", "8MPa", "--set", "load.amplitude=2.4kN", "--out", str(folder)]
-    code, out, _ = cli("run", *BASE, *SPECIMEN, *load, "--json")
-    assert code == 0
+    with os.fdopen(writing, "w") as pipe:
+        monkeypatch.setattr(sys, "stdout", pipe)
+        assert main.main(["run", *BASE, *SPECIMEN, *load, "--json"]) == 0
+    assert names(folder) == RUN_FILES
     values = {"strip.length": 0.12, "strip.half_height": 0.006, "strip.youngs_modulus": 210e9}
     values |= {"contact.pressure": 8e6, "load.amplitude": 2.4e3 / 0.05}
     history = jb.solve(jb.Scene().replace(COARSE | values))
-    assert json.loads(out)["dissipation"] == pytest.approx(float(history.dissipation), rel=1e-9)
+    figures = json.loads((folder / "result.json").read_text())
+    assert figures["dissipation"] == pytest.approx(float(history.dissipation), rel=1e-9)
     text = (folder / "scene.toml").read_text()
     for line in ("half_height = 0.006", "youngs_modulus = 210000000000.0", "amplitude = 48000.0"):
         assert line in text
@@ -153,15 +156,6 @@ def test_what_to_be_wary_of_is_told_on_stderr(cli, monkeypatch):
     assert err.splitlines() == [f"jbeamshell: warning: {doubt}" for doubt in suspect]
 
 
-def test_a_reader_that_leaves_early_costs_no_files(monkeypatch, tmp_path):
-    reading, writing = os.pipe()
-    os.close(reading)
-    with os.fdopen(writing, "w") as pipe:
-        monkeypatch.setattr(sys, "stdout", pipe)
-        assert main.main(["run", *BASE, "--out", str(tmp_path)]) == 0
-    assert names(tmp_path) == RUN_FILES
-
-
 # --- help -----------------------------------------------------------------------------------------
 
 
@@ -194,7 +188,7 @@ def test_scenes_are_listed_with_a_line_each(cli):
 
 
 def test_a_scene_without_cycles_by_name(cli, tmp_path):
-    few = {"model.nodes": 41, "model.kinematics": "linear"}
+    few = {"model.nodes": 21, "model.kinematics": "linear"}
     code, out, err = cli("run", "block", "--json", *options(few), "--out", tmp_path)
     assert code == 0
     assert "warning" not in err
@@ -205,7 +199,6 @@ def test_a_scene_without_cycles_by_name(cli, tmp_path):
     assert figures["reaction_max"] == pytest.approx(100.0)
     assert figures["squeeze_stress_max"] == pytest.approx(100.0)
     assert names(tmp_path) == TABLES | {"contact.png"}
-    assert is_png(tmp_path / "contact.png")
     with (tmp_path / "loop.csv").open(newline="") as table:
         (row,) = csv.DictReader(table)
     assert (row["force"], row["pressure"], row["contact_end"]) == ("0.0", "1.0", "1.0")
@@ -216,10 +209,11 @@ def test_the_standard_strip_without_cycles(cli):
     settings = COARSE | {"load.cycles": 0, "contact.pressure": pressure, "contact.normal": "held"}
     code, out, err = cli("run", "standard", *options(settings), "--json")
     assert code == 0
-    figures = json.loads(out)
-    assert set(figures) == {"reaction_max", "reaction_max_at", "squeeze_stress_max"} | PRESSED
+    assert (
+        set(json.loads(out)) == {"reaction_max", "reaction_max_at", "squeeze_stress_max"} | PRESSED
+    )
     # It may not lift, so the part that nothing presses is pulled down.
-    assert re.fullmatch(r"jbeamshell: warning: tension at the contact \([^\n]*\n", err)
+    assert err.startswith("jbeamshell: warning: tension at the contact (")
     assert "take contact.normal = rigid for unilateral contact" in err
 
 

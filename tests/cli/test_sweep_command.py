@@ -24,45 +24,40 @@ AMPLITUDES = ("--over", "load.amplitude=0.5:2.5:3")
 HEIGHTS = ("--over", "strip.height_ratio=0.05, .4")
 
 
-@pytest.mark.parametrize(
-    ("text", "values"),
-    [
-        ("load.amplitude=1:3:5", [1.0, 1.5, 2.0, 2.5, 3.0]),
-        ("load.amplitude=3:1:2", [3.0, 1.0]),
-        ("load.amplitude = 0.1 : 10 : 3 : log", [0.1, 1.0, 10.0]),
-        ("load.amplitude=.5", [0.5]),
-        ("load.amplitude=1,2e-1, 3", [1.0, 0.2, 3.0]),
-        ("load.amplitude=2:7:1", [2.0]),
-    ],
-)
-def test_ranges_are_what_they_say(text, values):
-    np.testing.assert_allclose(ranges([text])["load.amplitude"], values, rtol=1e-14)
+RANGES = {
+    "load.amplitude=1:3:5": [1.0, 1.5, 2.0, 2.5, 3.0],
+    "load.amplitude=3:1:2": [3.0, 1.0],
+    "load.amplitude = 0.1 : 10 : 3 : log": [0.1, 1.0, 10.0],
+    "load.amplitude=.5": [0.5],
+    "load.amplitude=1,2e-1, 3": [1.0, 0.2, 3.0],
+    "load.amplitude=2:7:1": [2.0],
+}
+NO_RANGES = {
+    "": "at least one key",
+    "load.amplitude": "write KEY=START:STOP:COUNT",
+    "load.amplitud=1:2:3": "did you mean 'load.amplitude'",
+    "load.amplitude=": "is empty",
+    "load.amplitude=1:2:0": "is empty; COUNT",
+    "load.amplitude=1:2:-3": "is empty; COUNT",
+    "load.amplitude=1:2:2.5": "COUNT must be a whole number",
+    "load.amplitude=1:2": "write KEY",
+    "load.amplitude=1:2:3:cubic": "write KEY",
+    "load.amplitude=0:2:3:log": "must be positive for a log range",
+    "load.amplitude=1,,2": "'' is not a finite number",
+    "load.amplitude=1,two": "'two' is not a finite number",
+    "load.amplitude=0:inf:3": "'inf' is not a finite number",
+    "load.amplitude=0:1:99999999999": "99,999,999,999 lanes .* take",
+    "load.amplitude=1 load.amplitude=2": "is given twice",
+}
 
 
-@pytest.mark.parametrize(
-    ("texts", "says"),
-    [
-        ([], "at least one key"),
-        (["load.amplitude"], "write KEY=START:STOP:COUNT"),
-        (["load.amplitud=1:2:3"], "did you mean 'load.amplitude'"),
-        (["load.amplitude="], "is empty"),
-        (["load.amplitude=1:2:0"], "is empty; COUNT"),
-        (["load.amplitude=1:2:-3"], "is empty; COUNT"),
-        (["load.amplitude=1:2:2.5"], "COUNT must be a whole number"),
-        (["load.amplitude=1:2"], "write KEY"),
-        (["load.amplitude=1:2:3:cubic"], "write KEY"),
-        (["load.amplitude=0:2:3:log"], "must be positive for a log range"),
-        (["load.amplitude=1,,2"], "'' is not a finite number"),
-        (["load.amplitude=1,two"], "'two' is not a finite number"),
-        (["load.amplitude=0:inf:3"], "'inf' is not a finite number"),
-        (["load.amplitude=0:1:99999999999"], "99,999,999,999 lanes .* take"),
-        (["load.amplitude=1", "load.amplitude=2"], "is given twice"),
-    ],
-)
-def test_ranges_that_are_none_are_refused_in_one_line(texts, says):
-    with pytest.raises(InputError, match=says) as caught:
-        ranges(texts)
-    assert "\n" not in str(caught.value)
+def test_ranges_are_what_they_say_or_refused_in_one_line():
+    for text, values in RANGES.items():
+        np.testing.assert_allclose(ranges([text])["load.amplitude"], values, rtol=1e-14)
+    for text, says in NO_RANGES.items():
+        with pytest.raises(InputError, match=says) as caught:
+            ranges(text.split())
+        assert "\n" not in str(caught.value)
 
 
 def test_json_is_strict_and_files_hold_the_same(cli, tmp_path):
