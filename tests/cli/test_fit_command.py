@@ -238,55 +238,21 @@ def test_starts_go_before_settings_before_files_before_the_example(asked, tmp_pa
     assert got.load.amplitude == 0.5
 
 
-@pytest.fixture(scope="module")
-def noisy(tmp_path_factory):
-    """A smooth displacement to 0.002 and a noisy force."""
+def test_the_smooth_column_drives_unless_one_is_set(asked, tmp_path):
     phase = np.linspace(0.0, 2.0 * np.pi, 200)
     noise = 0.02 * np.random.default_rng(5).standard_normal(phase.size)
     table = np.column_stack([np.cos(phase + 0.3) + noise, 0.002 * np.cos(phase)])
-    path = tmp_path_factory.mktemp("noisy") / "rig.csv"
+    path, scene = tmp_path / "rig.csv", tmp_path / "scene.toml"
     np.savetxt(path, table, delimiter=",", header="force,displacement", comments="")
-    return path
-
-
-def test_the_smooth_column_drives(asked, noisy, tmp_path):
-    free = ("--free", "contact.friction")
-    load = asked(noisy, *free)[1].load
-    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
-    load = asked(noisy, *free, "--set", "load.control=displacement")[1].load
-    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
-    load = asked(noisy, *free, "--set", "load.control=force")[1].load
-    assert load.control == "force"
-    assert float(load.amplitude) == pytest.approx(max(read_loops(noisy)[0].force), rel=0.1)
-    scene = tmp_path / "scene.toml"
     scene.write_text("[load]\ncontrol = 'force'\namplitude = 0.5\n")
-    load = asked(noisy, *free, "--scene", scene)[1].load
+    free = (path, "--free", "contact.friction")
+    load = asked(*free)[1].load
+    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
+    (loop,), one, _ = asked(*free, "--set", "load.control=force")
+    assert (loop.driver, one.load.control) == ("force", "force")
+    assert float(one.load.amplitude) == pytest.approx(max(read_loops(path)[0].force), rel=0.1)
+    load = asked(*free, "--scene", scene)[1].load
     assert (load.control, float(load.amplitude)) == ("force", 0.5)
-
-
-def test_the_control_that_is_set_decides_how_cycles_are_averaged(asked, tmp_path):
-    u = rig.path(3)
-    rows = np.column_stack([7.0 * rig.jenkins(u), 1e-4 * u])
-    head = "force [N/m],displacement [m]"
-    np.savetxt(tmp_path / "rig.csv", rows, delimiter=",", header=head, comments="")
-    words = (tmp_path / "rig.csv", "--free", "contact.friction")
-    for further, driver in (
-        ((), "displacement"),
-        (("--set", "load.control=displacement"), "displacement"),
-        (("--set", "load.control=force"), "force"),
-    ):
-        (loop,), scene, _ = asked(*words, *further)
-        assert (loop.driver, scene.load.control) == (driver, driver)
-
-
-# --- bad input ----------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_free_keys_that_the_loops_do_not_depend_on(refused, planted):
-    bar = options({"model.section": "bar", "model.nodes": 5, "model.kinematics": "linear"})
-    line = refused("fit", planted, *bar, "--free", "strip.kappa_s")
-    assert line == "free 'strip.kappa_s': the data do not depend on it at its start; leave it out"
 
 
 def test_a_law_takes_the_place_of_the_strip(tmp_path, capsys):

@@ -119,17 +119,17 @@ def test_run_leaves_what_runs_again_to_the_last_bit(cli, tmp_path):
     assert jb.read_scene(folder / "scene.toml").contact.friction == third
 
 
-def test_set_overrides_the_file_and_an_alias_its_twin(cli, tmp_path):
-    scene = tmp_path / "scene.toml"
-    sections = "[strip]\nheight_ratio = 0.1\nlength = 4.0\n[load]\namplitude = 0.5\ncycles = 1\n"
-    scene.write_text(sections + "steps_per_half_cycle = 8\n")
-    model = options({k: v for k, v in COARSE.items() if k.startswith("model")})
-    _, out, _ = cli("run", scene, *model)
-    assert "eta = 0.1, force amplitude 0.5: " in out
-    _, out, _ = cli("run", scene, *model, *options({"load.amplitude": 0.625}))
-    assert "eta = 0.1, force amplitude 0.625: " in out
-    _, out, _ = cli("run", scene, *model, *options({"strip.half_height": 0.3}))
-    assert "eta = 0.15, force amplitude 0.5: " in out
+def test_set_overrides_the_file_and_an_alias_its_twin(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text("[strip]\nheight_ratio = 0.1\nlength = 4.0\n[load]\namplitude = 0.5\n")
+
+    def scene(**values):
+        words = options({key.replace("__", "."): value for key, value in values.items()})
+        return arguments.scene_of(main._parser().parse_args(["run", str(file), *words]))
+
+    assert (float(scene().strip.height_ratio), float(scene().load.amplitude)) == (0.1, 0.5)
+    assert float(scene(load__amplitude=0.625).load.amplitude) == 0.625
+    assert float(scene(strip__half_height=0.3).strip.height_ratio) == pytest.approx(0.15)
 
 
 def test_words_numbers_and_lists_of_the_command_line():

@@ -10,12 +10,10 @@ from jbeamshell import laws
 from jbeamshell.dynamics import Attachment, Joint, Structure, modal_curve
 
 MASING = {
-    "jenkins": laws.Jenkins(2.0, 100.0),
     "sliders": laws.law_named("sliders3")(0.01, 0.05, 0.6, 0.9, 0.5),
     "iwan4": laws.Iwan4(2.0, 100.0, -0.5, 0.3),
     "iwan4, steep": laws.Iwan4(2.0, 100.0, -0.9, 0.0),
     "bar": laws.Bar(2.0, 0.05),
-    "mindlin": laws.Mindlin(2.0, 100.0),
 }
 
 
@@ -31,8 +29,7 @@ def test_a_joint_has_the_loops_of_its_law(name):
     path = slides * np.array([0.5, -0.3, 0.2, -0.1, 0.9, -1.2, 0.1, 1.3])
     forces = 3.0 * np.asarray(law.path_forces(path))
     np.testing.assert_allclose(joint.path_forces(path), forces, rtol=0.0, atol=1.2e-2)
-    exact = isinstance(law, laws.Jenkins | laws.parallel_iwan.Sliders)
-    assert not exact or np.max(np.abs(np.asarray(joint.path_forces(path)) - forces)) < 1e-12
+    assert name != "sliders" or np.max(np.abs(np.asarray(joint.path_forces(path)) - forces)) < 1e-12
     u = joint.displacement(jnp.asarray([0.6, 3.0]))
     np.testing.assert_allclose(joint.backbone(u), [0.6, 3.0], rtol=1e-12)
 

@@ -655,40 +655,6 @@ def test_variables_that_make_no_recording(tmp_path):
         assert told in told_of(lambda path=path: read_loops(path))
 
 
-GOOD = {}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _good_files(tmp_path_factory):
-    for name in ("good.npz", "good.npy"):
-        variables = of_structs("force", "displacement") if name.endswith("npy") else BOTH
-        path = written(tmp_path_factory.getbasetemp() / name, variables)
-        GOOD[path.suffix] = path.read_bytes()
-
-
-@given(
-    suffix=st.sampled_from([".npz", ".npy"]),
-    at=st.integers(0, 600),
-    length=st.integers(0, 20),
-    new=st.binary(max_size=20),
-    cut=st.none() | st.integers(0, 600),
-)
-@pytest.mark.filterwarnings("ignore")
-def test_broken_files_give_recordings_or_one_clear_line(
-    tmp_path_factory, suffix, at, length, new, cut
-):
-    good = GOOD[suffix]
-    path = tmp_path_factory.getbasetemp() / f"broken{suffix}"
-    path.write_bytes((good[:at] + new + good[at + length :])[:cut])
-    try:
-        found, refused = read_loops(path), path.name
-    except InputError as error:
-        found, refused = [], str(error)
-    assert path.name in refused
-    assert len(refused.splitlines()) == 1
-    assert np.all(np.isfinite([[r.force, r.displacement] for r in found]))
-
-
 # --- several files ------------------------------------------------------------------------------
 
 

@@ -1,7 +1,6 @@
 """Strips and joints by CalculiX: meshes, decks, what is read back, what goes wrong, real runs."""
 
 import json
-import re
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -13,120 +12,14 @@ import toy
 
 import jbeamshell as jb
 from calibration.finite_elements import deck, lap, mesh, solve
-from jbeamshell.scene import library, load_path
+from jbeamshell.scene import library
 from jbeamshell.scene.keys import ENTRIES
-from jbeamshell.scene.parts import unit_path
 
 STRIP = toy.STRIP.replace({"load.entry": "traction"})
 RECORDS = Path(deck.__file__).parent
 COARSE = {"load.cycles": 1, "load.steps_per_half_cycle": 4}
 DRIVEN = {"load.control": "displacement", "load.amplitude": 1e-5}
 STEPPED = [[0.0, 10.0], [1.5, 10.0], [1.5, 0.0], [2.0, 0.0]]
-
-
-def path_of(scene):
-    """The scene's own cycles, without the compiled check of gross slip."""
-    target = unit_path(scene.load.cycles, scene.plan.steps) * float(scene.load.amplitude)
-    before = np.arange(1, scene.load.pressure_steps + 1) / scene.load.pressure_steps
-    return load_path.LoadPath(
-        np.append(0.0 * before, target),
-        np.append(before, np.ones_like(target)),
-        np.append(0.0 * before, np.ones_like(target)),
-    )
-
-
-def deck_of(scene, elements="quadratic"):
-    made = mesh.make_mesh(scene, elements, 0.4)
-    return made, deck.write_deck(scene, path_of(scene), made)
-
-
-def cards(text):
-    """Keyword lines with their data lines."""
-    for block in re.split(r"^\*", text, flags=re.MULTILINE)[1:]:
-        keyword, *rows = block.strip().split("\n")
-        yield keyword, [row.split(", ") for row in rows]
-
-
-# --- decks ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("elements", "pressure", "total"), [("linear", 10.0, 20.0), ("quadratic", STEPPED, 15.0)]
-)
-def test_nodal_forces_add_up_to_the_loads(elements, pressure, total):
-    scene = STRIP.replace(COARSE | {"contact.pressure": pressure})
-    made, text = deck_of(scene, elements)
-    forces = [rows for keyword, rows in cards(text) if keyword == "CLOAD"]
-    pressing, end = forces[-2:]
-    assert sum(float(row[2]) for row in pressing) == pytest.approx(-total)
-    assert {row[1] for row in pressing} == {"2"}
-    assert sum(float(row[2]) for row in end) == pytest.approx(0.7855)
-    assert [int(row[0]) for row in end] == made.number[-1].tolist()
-    if elements == "quadratic":
-        assert made.shares[1] / made.shares[0] == pytest.approx(4.0)
-
-
-def equations(text):
-    """Terms (k, 3) of each equation: node, direction and factor."""
-    for keyword, rows in cards(text):
-        if keyword == "EQUATION":
-            yield np.array(rows[1:], float)
-
-
-def left_over(made, text, along):
-    """Rest of each equation of a deck under displacements u_x of the section X = L."""
-    u = dict(zip(made.number[-1].tolist(), along, strict=True))
-    for terms in equations(text):
-        assert set(terms[:, 1]) == {1.0}
-        yield sum(u[int(node)] * factor for node, _, factor in terms)
-
-
-@pytest.mark.parametrize(("entry", "turns"), [("face", True), ("guided", False)])
-def test_a_rigid_face_moves_as_one(entry, turns):
-    made, text = deck_of(STRIP.replace(COARSE | {"load.entry": entry}))
-    assert sum(1 for _ in equations(text)) == made.y.size - (2 if turns else 1)
-    np.testing.assert_allclose([*left_over(made, text, np.ones(made.y.size))], 0.0, atol=1e-11)
-    turned = np.abs([*left_over(made, text, made.y)])
-    assert (np.max(turned) < 1e-11) == turns
-    assert np.min(np.abs([*left_over(made, text, made.y**2)])) > 1e-5
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("entry", ["traction", "member"])
-@pytest.mark.parametrize("joint", [lap.joint, lap.double_shear])
-def test_forces_on_a_joint_are_in_balance(joint, entry):
-    scene = joint(entry)
-    upper, lower = members = lap.make_members(scene, 0.4)
-    found = [*cards(lap.write_deck(scene, members))]
-    pressing, *_, pulling = (rows for keyword, rows in found if keyword == "CLOAD")
-    forces = {(int(n), int(d)): float(force) for n, d, force in pulling}
-    above, below = (
-        sum(forces.get((int(n), 2), 0.0) for n in member.mesh.number[:, row])
-        for member, row in ((upper, -1), (lower, 0))
-    )
-    assert above == pytest.approx(-20.0)
-    assert below == pytest.approx(0.0 if scene.member.support == "rolling" else 20.0)
-    pulled = sum(forces[int(n), 1] for n in upper.outer)
-    assert pulled == pytest.approx(float(scene.load.amplitude))
-    assert len(pulling) == len(pressing) + upper.outer.size
-    goes_on = any(keyword == "BOUNDARY, FIXED" for keyword, _ in found)
-    assert goes_on == (entry == "member")
-    assert (upper.softness > 0.0) == (lower.softness > 0.0) == goes_on
-
-
-def test_contact_stiffness_does_not_depend_on_the_units():
-    metres, millimetres = (
-        STRIP,
-        {
-            "strip.length": 2e3,
-            "strip.axial_stiffness": 3.4e1,  # N/m to N/mm
-            "contact.pressure": 10e-6,
-            "load.amplitude": 0.7855e-3,
-        },
-    )
-    one, other = (deck.penalty(s, path_of(s)) for s in (metres, metres.replace(millimetres)))
-    assert other.normal / one.normal == pytest.approx(1e-9)
-    assert other.stick / one.stick == pytest.approx(1e-9)
 
 
 # --- what goes wrong ------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """Results of a sweep as others read them: a set of arrays, its files, pictures; interruptions."""
 
-import itertools
-
 import numpy as np
 import pytest
 import xarray
@@ -94,38 +92,6 @@ def test_a_map_marks_the_lanes_not_to_rely_on():
     assert crosses.get_xdata().size == np.sum(swept["doubtful"])
     with pytest.raises(jb.InputError, match="a map needs two keys"):
         plotting.sweep_contour(made_up(paired=True))
-
-
-def label_boxes(axis):
-    """Boxes of an axis's labels that are seen, along the axis."""
-    axis.figure.draw_without_rendering()
-    labels = [*axis.get_ticklabels(), *axis.get_ticklabels(minor=True)]
-    low, high = sorted(axis.get_view_interval())
-    places = [*axis.get_ticklocs(), *axis.get_ticklocs(minor=True)]
-    seen = [
-        label.get_window_extent()
-        for label, place in zip(labels, places, strict=True)
-        if label.get_text() and low <= place <= high
-    ]
-    return sorted(seen, key=lambda box: (box.x0, box.y0))
-
-
-@pytest.mark.parametrize("amplitudes", [np.linspace(0.05, 1.5, 6), np.array([0.05, 1.5])])
-def test_labels_of_a_map_with_logarithmic_axes_do_not_touch_and_its_cells_are_whole(amplitudes):
-    over = {"load.amplitude": amplitudes, "strip.height_ratio": np.array([0.01, 0.05, 0.3])}
-    lanes = Lanes(STRIP, over, False)
-    stiffness = 1.7e4 / (1.0 + 0.2 * np.broadcast_to(lanes.difficulty, lanes.shape))
-    swept = dataset(lanes, {"secant_stiffness": stiffness}, np.zeros(lanes.shape, np.int8), [])
-    axes = plotting.sweep_contour(swept, figure="secant_stiffness")
-    assert axes.get_xscale() == axes.get_yscale() == "log"
-    bar = axes.figure.axes[1]
-    for axis in (axes.xaxis, axes.yaxis, bar.yaxis):
-        boxes = label_boxes(axis)
-        assert len(boxes) >= 2
-        for one, other in itertools.combinations(boxes, 2):
-            assert not one.overlaps(other)
-    left, right = axes.get_xlim()
-    assert left < amplitudes[0] < amplitudes[-1] < right
 
 
 # --- interrupted ----------------------------------------------------------------------------------

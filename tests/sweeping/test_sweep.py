@@ -173,31 +173,6 @@ def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypat
     assert "2 lanes have a figure that is not defined there (0/0)" in odd.notes
 
 
-@pytest.mark.slow
-def test_steps_that_fail_in_the_batch_are_walked_in_pieces(monkeypatch):
-    alone, solve_alone = [], runner.Runner._alone
-
-    def noted(self, scene, numbers):
-        alone.append(numbers)
-        return solve_alone(self, scene, numbers)
-
-    monkeypatch.setattr(runner.Runner, "_alone", noted)
-    # Smooth sliders need Newton's method, whose iterations are limited here; sharp ones do not.
-    scene, hasty = SCENE.replace({"contact.smoothing": 8.0}), jb.Newton(max_iterations=6)
-    over = {"load.amplitude": np.linspace(0.2, 1.9, 6), **_eta([0.05, 0.1, 0.2])}
-    hurried = jb.sweep(scene, over, FIGURES, solver=hasty)
-    failed = int(np.sum(hurried["status"] != Outcome.CONVERGED))
-    assert 0 < failed < len(alone) < hurried["status"].size
-    for at, numbers in lanes_in(over):
-        one = scene.replace(dict(zip(over, numbers, strict=True)))
-        history = jb.solve(one, solver=hasty, throw=False)
-        assert (hurried.status[at] == Outcome.CONVERGED) == history.converged
-        if history.converged:
-            assert float(hurried["dissipation"][at]) == pytest.approx(
-                float(history.dissipation), rel=1e-9
-            )
-
-
 # --- the domain -----------------------------------------------------------------------------------
 
 EDGES = {
@@ -401,44 +376,27 @@ def test_a_model_of_ones_own_is_not_kept_on_disk():
         job.Job(lanes_of(scene, OVER), scene, FIGURES).description()
 
 
-def test_chunks_hold_lanes_that_share_what_they_must():
+def test_lanes_advance_together_as_far_as_they_share_a_body():
+    """Grids share one body for each height; pairs at random are interpolated together."""
     shared = np.array([[1, 1, 1, 1, 1, 2, 2, 3]])
     np.testing.assert_array_equal(runner.places_in_chunks(shared, 3), [0, 1, 2, 3, 4, 6, 7, 9])
-    np.testing.assert_array_equal(runner.places_in_chunks(shared[:0], 3), np.arange(8))
-
-
-def test_lanes_advance_together_as_far_as_they_share_a_body():
-    """Grids share one body for each height; pairs at random share none, and run alone."""
-    scene = jb.Scene().replace(
-        {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 17}
-    )
     count = runner.ABREAST
     pressures, heights = np.linspace(5.0, 9.0, count), np.linspace(0.05, 0.1, count)
     over = {"contact.pressure": pressures, "strip.height_ratio": heights}
 
-    def width(over, paired=False):
-        return job.Job(lanes_of(scene, over, paired), scene, ("dissipation",)).chunks.width
-
-    assert width(over) == runner.ABREAST
-    assert width(over, paired=True) == 1
-    pairs = np.repeat(heights[: count // 2], 2)
-    assert width(over | {"strip.height_ratio": pairs}, paired=True) == 2
-    assert width({"strip.height_ratio": heights}) == 1
-    assert width({"contact.pressure": pressures[:5]}) == 8
-
-
-def test_bodies_are_interpolated_together_where_lanes_share_none():
-    scene, heights = jb.Scene().replace({"model.section": "plane"}), np.linspace(0.05, 0.3, 40)
-
-    def chunks(over, paired=False):
+    def chunks(section, over, paired=False):
+        scene = jb.Scene().replace({"model.section": section, "model.nodes": 17})
         return job.Job(lanes_of(scene, over, paired), scene, ("dissipation",)).chunks
 
-    loads = np.linspace(0.1, 0.5, 40)
-    over = {"strip.height_ratio": heights, "load.amplitude": loads}
-    assert chunks(over, paired=True) == runner.Chunks(runner.APART, alike=False)
-    assert chunks(over | {"load.amplitude": loads[:16]}) == runner.Chunks(16, alike=True)
-    gap = {"strip.curvature": np.linspace(0.0, 1e-5, 40)}  # of which each is condensed
-    assert chunks(over | gap, paired=True).width == 1
+    assert chunks("squeeze", over).width == count
+    assert chunks("squeeze", over, paired=True).width == 1
+    pairs = over | {"strip.height_ratio": np.repeat(heights[: count // 2], 2)}
+    assert chunks("squeeze", pairs, paired=True).width == 2
+    assert chunks("squeeze", {"strip.height_ratio": heights}).width == 1
+    assert chunks("squeeze", {"contact.pressure": pressures[:5]}).width == 8
+    assert chunks("plane", over, paired=True) == runner.Chunks(runner.APART, alike=False)
+    gap = {"strip.curvature": np.linspace(0.0, 1e-5, count)}  # of which each is condensed
+    assert chunks("plane", over | gap, paired=True).width == 1
 
 
 @pytest.mark.doubtful("few nodes")
