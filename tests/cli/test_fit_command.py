@@ -248,11 +248,17 @@ def test_the_smooth_column_drives_unless_one_is_set(asked, tmp_path):
     free = (path, "--free", "contact.friction")
     load = asked(*free)[1].load
     assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
-    (loop,), one, _ = asked(*free, "--set", "load.control=force")
-    assert (loop.driver, one.load.control) == ("force", "force")
-    assert float(one.load.amplitude) == pytest.approx(max(read_loops(path)[0].force), rel=0.1)
+    load = asked(*free, "--set", "load.control=force")[1].load
+    assert float(load.amplitude) == pytest.approx(max(read_loops(path)[0].force), rel=0.1)
     load = asked(*free, "--scene", scene)[1].load
     assert (load.control, float(load.amplitude)) == ("force", 0.5)
+    u = rig.path(3)  # cycles, which are averaged along the column that drives
+    rows = np.column_stack([7.0 * rig.jenkins(u), 1e-4 * u])
+    head = "force [N/m],displacement [m]"
+    np.savetxt(path, rows, delimiter=",", header=head, comments="")
+    for words, driver in (((), "displacement"), (("--set", "load.control=force"), "force")):
+        (loop,), one, _ = asked(*free, *words)
+        assert (loop.driver, one.load.control) == (driver, driver)
 
 
 def test_a_law_takes_the_place_of_the_strip(tmp_path, capsys):

@@ -96,7 +96,7 @@ def test_a_loop_has_its_path_and_the_last_cycle(clamped):
 def test_profiles_take_turns_and_zero_crossings_of_the_last_cycle(clamped, pull, pressing):
     panels = plotting.profiles(clamped).ravel()
     shown, legend = curves(panels[2]), texts(panels[2].get_legend())
-    np.testing.assert_allclose(shown[:4], clamped.traction[ZEROS_AND_TURNS])
+    np.testing.assert_allclose(shown[:4], clamped.traction[ZEROS_AND_TURNS] / 10.0)  # of mu p
     assert (legend[0], legend[2]) == ("$F = 0$, falling", "$F = 0$, rising")
     change = clamped.psi[ZEROS_AND_TURNS[-1]] - clamped.psi[3]  # from the pressed strip
     np.testing.assert_array_equal(panels[1].get_lines()[-1].get_ydata(), change)
