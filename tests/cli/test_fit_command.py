@@ -261,6 +261,13 @@ def test_the_smooth_column_drives_unless_one_is_set(asked, tmp_path):
         assert (loop.driver, one.load.control) == (driver, driver)
 
 
+@pytest.mark.slow
+def test_free_keys_that_the_loops_do_not_depend_on(refused, planted):
+    bar = options({"model.section": "bar", "model.nodes": 5, "model.kinematics": "linear"})
+    line = refused("fit", planted, *bar, "--free", "strip.kappa_s")
+    assert line == "free 'strip.kappa_s': the data do not depend on it at its start; leave it out"
+
+
 def test_a_law_takes_the_place_of_the_strip(tmp_path, capsys):
     u = 0.02 * np.cos(np.linspace(0.0, 2.0 * np.pi, 65))
     path = np.append(np.linspace(0.0, 0.02, 9)[1:], u)

@@ -286,7 +286,10 @@ def test_a_first_loading_has_no_cycles():
     assert seen.sound
     assert "never turns back" in str(seen)
     assert names(inspect(rig.recorded(-rig.iwan(u), u))) == {"wrong sign"}
-    plt.close(inspection(seen)[0].figure)
+    loops, *_ = inspection(seen)
+    with pytest.raises(InputError, match="need 3, not"):
+        inspection(seen, [loops])
+    plt.close(loops.figure)
 
 
 def test_what_all_amplitudes_show_is_said_once():
