@@ -109,6 +109,7 @@ def test_fit_prints_text_to_read(cli, planted):
     ]
 
 
+@pytest.mark.slow
 def test_python_and_the_command_line_are_one_door(cli, tmp_path):
     """A file and its loops: the same starts, numbers, doubts and notes, with nothing given."""
     rows = np.column_stack(rig_file(np.random.default_rng(3)))

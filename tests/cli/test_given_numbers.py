@@ -62,6 +62,7 @@ def test_lanes_of_a_sweep_keep_it():
         assert float(found[place]) == pytest.approx(lost(one), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_slopes_keep_it():
     over = (HEIGHT, LENGTH, NU)
     ask, at = jb.response(GIVEN, over), [STEEL[key] for key in over]
@@ -73,6 +74,7 @@ def test_slopes_keep_it():
         assert float(slope) / size == pytest.approx((high - low) / (2.0 * step) / size, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_fit_keeps_it():
     planted = jb.solve(jb.Scene().replace(OTHERS | STEEL | {HEIGHT: 8.0}), throw=False)
     fit = jb.fit(make_loop(*planted.loop), GIVEN, [HEIGHT], starts=1)

@@ -47,7 +47,7 @@ def test_a_joint_has_the_slopes_of_its_law():
         def loss(values):
             return of(law.replace(dict(zip(keys, values, strict=True)))).dissipation(size)
 
-        return np.asarray(jax.jacfwd(loss)(start)) * np.asarray(start) / lost
+        return np.asarray(jax.jit(jax.jacfwd(loss))(start)) * np.asarray(start) / lost
 
     np.testing.assert_allclose(slopes(Joint.of), slopes(lambda law: law), rtol=0.03, atol=5e-3)
 
@@ -96,6 +96,7 @@ def test_a_law_that_rises_for_ever_needs_a_force():
     assert float(Joint.of(held, 3.0).forces[-1]) == pytest.approx(3.0)
 
 
+@pytest.mark.slow
 def test_the_joint_of_a_plain_scene_loses_what_a_plain_call_does_at_small_amplitudes():
     # The squeeze section, which serves the scene's own amplitude, loses 18 times as much at .1.
     scene = jb.Scene()

@@ -15,6 +15,7 @@ from jbeamshell.scene.load_path import check
 from jbeamshell.sweeping import job, lanes, runner
 from jbeamshell.sweeping.lanes import Outcome, lanes_of
 
+PLANE = {"model.section": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
 OPEN = {"model.kinematics": "auto"}
 OVER = {"load.amplitude": [0.3, 1.9, 1.1, 2.5, 0.7], "strip.height_ratio": [0.05, 0.4]}
 HELD = SCENE.replace({"contact.normal": "held"})
@@ -141,7 +142,7 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
 
 @pytest.mark.doubtful("lanes may be off")
 def test_a_lane_that_is_solved_alone_has_the_estimate_of_its_run(monkeypatch):
-    failing, scene = runner.Runner._answers, jb.Scene().replace({"model.nodes": 17})
+    failing, scene = runner.Runner._answers, jb.Scene().replace(PLANE)
 
     def failed(self, columns):
         values, status = map(np.array, failing(self, columns))
@@ -336,6 +337,7 @@ def test_a_sweep_that_was_cut_off_goes_on(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["sweep.csv"]
 
 
+@pytest.mark.slow
 def test_a_sweep_of_a_strip_given_by_e_and_h_goes_on(tmp_path):
     """Given numbers stay given in the lanes of a store, and after an interruption."""
     given = {"strip.length": 120.0, "strip.half_height": 6.0, "strip.youngs_modulus": 210e3}
@@ -402,8 +404,7 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
 @pytest.mark.doubtful("few nodes")
 def test_lanes_of_plane_elasticity_share_their_bodies():
     """A grid whose heights share a body, beside the same strips paired at random."""
-    plane = {"model.section": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
-    scene = jb.Scene().replace(plane)
+    scene = jb.Scene().replace(PLANE)
     over = {"load.amplitude": [0.4, 0.8, 1.2], "strip.height_ratio": [0.05, 0.1]}
     grid = jb.sweep(scene, over, ["dissipation"])
     order = np.random.default_rng(0).permutation(6)
