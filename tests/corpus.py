@@ -147,11 +147,6 @@ def with_column(place: int, change: Callable[[np.ndarray], np.ndarray]) -> list[
     return columns
 
 
-def numpy_file(path: Path) -> None:
-    time, force, displacement = strip()
-    np.savez(path, time_s=time, force_N=1e3 * force, displacement_m=1e-3 * displacement)
-
-
 def matlab_file(path: Path) -> None:
     time, force, displacement = strip()
     scipy.io.savemat(path, {"rig": {"t": time, "force_kN": force, "displacement_mm": displacement}})
@@ -172,8 +167,6 @@ HONEST = ("parameters", "not this model")
 MU = {"contact.friction": (FRICTION, 0.03)}
 ROUGH = {"contact.friction": (FRICTION, 0.1)}
 GERMAN = ("Zeit [s]", "Prüfkraft [kN]", "Kolbenweg [mm]")
-FRENCH = ("Temps (s)", "Effort (kN)", "Déplacement (mm)")
-ITALIAN = ("Tempo[s]", "Forza[kN]", "Spostamento[mm]")
 ABOVE = "Prüfstand 3\nBediener: N. N.; 12.05.2024\n\n"
 STANDARD = {"strip.length": 2.0, "strip.axial_stiffness": 3.4e4, "contact.pressure": 10.0}
 OF_STANDARD = [w for key, value in STANDARD.items() for w in ("--set", f"{key}={value}")]
@@ -188,10 +181,6 @@ def sound() -> Iterator[Case]:
     yield case("plain.csv", text(strip), words=LENGTHS)
     german = {"delimiter": ";", "decimal": ",", "encoding": "cp1252"}
     yield case("german.csv", text(strip, names=GERMAN, above=ABOVE, **german))
-    yield case("french.txt", text(strip, names=FRENCH, above=ABOVE, delimiter="\t", decimal=","))
-    yield case("italian.txt", text(strip, names=ITALIAN, delimiter=" "))
-    yield case("spreadsheet.txt", text(strip, delimiter="\t", encoding="utf-16"))
-    yield case("arrays.npz", numpy_file)
     yield case("workspace.mat", matlab_file)
     for seed, kind in enumerate(rig.NOISES):
         columns = functools.partial(strip, noise=0.02, kind=kind, seed=seed)
@@ -277,10 +266,6 @@ def wrong() -> Iterator[Case]:
     for name, law in (("pinched.csv", rig.pinched), ("bearing.csv", rig.bearing)):
         told = "within the clearance"
         yield case(name, text(functools.partial(other, law(u), u)), told, ALONE)
-    bare = ("time", "force", "displacement")
-    yield case("no units.csv", text(strip, names=bare), "--unit force=N")
-    half = ("time [s]", "force [kN]", "displacement")
-    yield case("one unit.csv", text(strip, names=half), r"write 'displacement \[m\]'")
     twins = ("time [s]", "force 1 [kN]", "force 2 [kN]", "displacement [mm]")
 
     def double() -> list[np.ndarray]:
@@ -288,20 +273,122 @@ def wrong() -> Iterator[Case]:
         return [time, force, force, displacement]
 
     yield case("two forces.csv", text(double, names=twins), "--column force=")
-    strange = ("time [s]", "channel 1 [kN]", "channel 2 [mm]")
-    yield case("strange names.csv", text(strip, names=strange), "--column force=NAME")
-    stuck = text(lambda: with_column(1, np.zeros_like))
-    yield case("dead sensor.csv", stuck, "constant")
 
-    def broken(path: Path) -> None:
-        path.write_bytes(table(strip()).replace(b"\n0.05,", b"\n0.05,overload ", 1))
 
-    yield case("text in a cell.csv", broken, "leave the cell empty")
+# --- other units, factors, offsets, headers and drives than a fit takes for granted ---------------
+
+LOST = ("refused", "not this model")
+NO_MODULUS = [w for w in LENGTHS if w not in ("--modulus", "210GPa")]
+TWO = {"contact.friction": (MU["contact.friction"][0], 0.1)}  # of two numbers that were fitted
+
+
+def units(force: str, displacement: str) -> tuple[str, ...]:
+    """Options of units; an empty one is left out."""
+    given = {"force": force, "displacement": displacement}
+    return tuple(w for name, unit in given.items() if unit for w in ("--unit", f"{name}={unit}"))
+
+
+def scaled(force: float = 1.0, displacement: float = 1.0, **more: Any) -> list[np.ndarray]:
+    """Columns of the planted strip, in kN and mm, times factors."""
+    time, f, u = strip(noise=0.002, **more)
+    return [time, force * f, displacement * u]
+
+
+def shifted(force: float = 0.0, displacement: float = 0.0, **more: Any) -> list[np.ndarray]:
+    """Columns of the planted strip with offsets in parts of their ranges."""
+    time, f, u = strip(**{"noise": 0.002, **more})
+    return [time, f + force * np.ptp(f), u + displacement * np.ptp(u)]
+
+
+def units_and_factors() -> Iterator[Case]:
+    """Units that titles name wrongly or not at all, and sensors' factors."""
+
+    def lost(name: str, columns: Callable[[], Any], then: Any, **more: Any) -> Case:
+        known = more.pop("words", KNOWN)
+        told, planted = more.pop("told", ""), more.pop("planted", MU)
+        return Case(name, text(columns, **more), list(known), LOST, told, planted, tuple(then))
+
+    def misnamed(
+        name: str,
+        columns: Callable[[], Any],
+        true: tuple[str, str],
+        titled: str = "kN mm",
+        **more: Any,
+    ) -> Case:
+        """File whose titles have wrong units, which the text must name rightly."""
+        then, (force, displacement) = units(*true), titled.split()
+        told = ".*".join(
+            re.escape(f"({word} {unit})") for word, unit in zip(then[::2], then[1::2], strict=True)
+        )
+        names = ("time [s]", f"force [{force}]", f"displacement [{displacement}]")
+        return lost(name, columns, then, names=names, told=told, **more)
+
+    of = functools.partial
+    volts = ("time [s]", "force [kN]", "displacement [V]")
+    amplified = text(of(scaled, displacement=20.0), names=volts)
+    factor = units("", "0.05mm/V")
+    yield Case("volts.csv", amplified, [*KNOWN, *factor], RIGHT, planted=MU)
+    yield Case("volts without a factor.csv", amplified, KNOWN, LOST, "", MU, factor)
+    then = (*units("", "0.05mm"), "--reverse", "displacement")
+    negative = [*KNOWN, *units("", "-0.05mm")]
+    turned = of(scaled, displacement=-20.0)
+    yield lost("negative factor.csv", turned, then, words=negative, told="--reverse displacement")
+    thousand, soft = of(scaled, 1e3, 1e3), of(scaled, 1.0, 1e3)
+    yield misnamed("newtons called kilonewtons.csv", of(scaled, 1e3), ("N", ""))
+    yield misnamed("millimetres called micrometres.csv", scaled, ("", "mm"), "kN um")
+    yield misnamed("both too small.csv", scaled, ("kN", "mm"), "N um")
+    start = [*KNOWN, "--start", "contact.friction=0.3"]
+    yield misnamed("both too large from a start.csv", thousand, ("N", "um"), words=start)
+    unknown = {"words": NO_MODULUS, "planted": TWO}
+    yield misnamed("no modulus and micrometres.csv", soft, ("", "um"), **unknown)
+    per_width = ("time [s]", "force [kN/mm]", "displacement [mm]")
+    along = text(of(scaled, 1.0 / (1e3 * WIDTH)), names=per_width)
+    yield Case("force per width.csv", along, KNOWN, RIGHT, planted=MU)
+
+
+def offsets() -> Iterator[Case]:
+    """Sensors that do not show zero where nothing acts."""
+
+    def case(name: str, columns: Callable[[], Any], then: tuple[str, ...] = ()) -> Case:
+        kinds = LOST if then else RIGHT
+        return Case(name, text(columns), KNOWN, kinds, "", MU, then)
+
+    of, centre = functools.partial, ("--centre",)
+    yield case("displacement off.csv", of(shifted, 0.0, 0.26))
+    yield case("displacement little off.csv", of(shifted, 0.0, 0.06), centre)
+    yield case("both off.csv", of(shifted, -0.2, 0.7), centre)
+    once = {"cycles": 1, "noise": 0.0}
+    yield case("one cycle and both off.csv", of(shifted, 0.2, 0.5, **once), centre)
+    by_displacement = {"amplitudes": (0.9,), "cycles": 3, "control": "displacement"}
+    yield case("drive off.csv", of(shifted, 0.0, -0.4, **by_displacement), centre)
+
+
+def headers_and_drives() -> Iterator[Case]:
+    """Tables of numbers alone; displacements that drive, and drives that are told wrongly."""
+
+    def bare(path: Path) -> None:
+        rows = zip(*strip(noise=0.002), strict=True)
+        lines = ["\t".join(f"{x:.8g}" for x in row) for row in rows]
+        path.write_text("Rig 3\nOperator: N. N.\n12.05.2024\n\n" + "\n".join(lines) + "\n")
+
+    chosen = ("--column", "force=2", "--column", "displacement=3", *units("kN", "mm"))
+    yield Case("no header below remarks.txt", bare, KNOWN, REFUSED, "has no header", MU, chosen)
+
+    def ramps(part: float, noise: float) -> Callable[[Path], object]:
+        return text(functools.partial(strip, (part,), 3, "displacement", noise))
+
+    yield Case("displacement drives.csv", ramps(1.2, 0.01), KNOWN, RIGHT, planted=MU)
+    told = [*KNOWN, "--set", "load.control=displacement"]
+    yield Case("force drives, told displacement.csv", text(scaled), told, RIGHT, planted=MU)
+    told = [*KNOWN, "--set", "load.control=force"]
+    then = ("--set", "load.control=displacement")
+    yield Case("slides, told force.csv", ramps(3.0, 0.002), told, LOST, "", MU, then)
 
 
 def corpus() -> list[Case]:
     """All files."""
-    return [*sound(), *of_other_laws(), *wrong()]
+    foreign = [*units_and_factors(), *offsets(), *headers_and_drives()]
+    return [*sound(), *of_other_laws(), *wrong(), *foreign]
 
 
 # --- how they end ---------------------------------------------------------------------------------

@@ -61,6 +61,7 @@ def test_sweeps_share_a_program_whatever_the_scene_s_other_numbers(compiled):
     assert np.all(found != first)
 
 
+@pytest.mark.slow
 def test_a_response_is_compiled_as_a_whole(compiled):
     """Not operation by operation, also of constants, which took 180 programs."""
     own = {"model.section": "bar", "load.steps_per_half_cycle": 14}  # of no other test
@@ -88,6 +89,7 @@ def test_responses_share_programs_and_derivatives_whatever_the_scene_s_other_num
     assert compiled() == []
 
 
+@pytest.mark.slow
 def test_a_response_is_made_of_traced_numbers_and_tables():
     table = np.array([[0.0, 8.0], [1.0, 8.0], [1.0, 0.0], [2.0, 0.0]])
     few = {"model.nodes": 17, "load.amplitude": 0.3}

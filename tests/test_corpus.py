@@ -8,10 +8,9 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.cli.main import main
 from jbeamshell.common.errors import InputError
-from tests import corpus, foreign
+from tests import corpus
 
 CASES = corpus.corpus()
-FOREIGN = foreign.foreign()
 
 
 SEEN = {  # findings of `jb.inspect` on files that no run of the model is needed for
@@ -51,19 +50,8 @@ def optimised():
 @pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_no_file_ends_in_silence(case, tmp_path, capsys):
-    code = main(corpus.words(case, tmp_path))
-    out, err = capsys.readouterr()
-    ending = corpus.ended(code, out, err, case, tmp_path)
-    with capsys.disabled():
-        print(f"\n{case.name:28s} {ending.kind:16s} {ending.told}")
-    assert ending.kind in case.kinds, ending
-    assert re.search(case.told, ending.told), ending
+    """Right at once, or by the options that the text names."""
 
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("optimised")
-@pytest.mark.parametrize("case", FOREIGN, ids=lambda case: case.name)
-def test_foreign_files_end_right_or_name_the_options_that_lead_there(case, tmp_path, capsys):
     def end(then=()):
         code = main(corpus.words(case, tmp_path, then))
         out, err = capsys.readouterr()

@@ -88,16 +88,15 @@ def test_code_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path):
         assert shown is None or alike(said, shown), said
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_command_lines_of_a_page_are_understood(page):
+def test_command_lines_of_pages_are_understood():
     parser = _parser()
-    for block in SHELL.findall(page.read_text("utf-8")):
-        for line in COMMAND.findall(block):
-            with contextlib.redirect_stderr(io.StringIO()) as said:
-                try:
-                    parser.parse_args(line.replace("'", "").split())
-                except SystemExit:
-                    pytest.fail(f"{line}: {said.getvalue()}")
+    blocks = [block for page in PAGES for block in SHELL.findall(page.read_text("utf-8"))]
+    for line in (line for block in blocks for line in COMMAND.findall(block)):
+        with contextlib.redirect_stderr(io.StringIO()) as said:
+            try:
+                parser.parse_args(line.replace("'", "").split())
+            except SystemExit:
+                pytest.fail(f"{line}: {said.getvalue()}")
 
 
 SOURCES = [

@@ -17,10 +17,6 @@ def code_cells(notebook):
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-def test_there_are_notebooks():
-    assert NOTEBOOKS
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs(path, monkeypatch):
@@ -39,19 +35,14 @@ def test_a_notebook_runs(path, monkeypatch):
     assert pictures(notebook) == pictures(nbformat.read(path, as_version=4)) > 0
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-class TestNotebook:
-    def test_is_committed_with_its_outputs(self, path):
-        cells = code_cells(nbformat.read(path, as_version=4))
+def test_notebooks_are_small_and_committed_with_their_outputs():
+    for path in NOTEBOOKS:
+        notebook = nbformat.read(path, as_version=4)
+        cells = code_cells(notebook)
         counts = [cell.execution_count for cell in cells]
         assert counts == list(range(1, len(cells) + 1)), "run it from top to bottom and save it"
-        kinds = {
-            output.get("name", output.output_type) for cell in cells for output in cell.outputs
-        }
+        kinds = {out.get("name", out.output_type) for cell in cells for out in cell.outputs}
         assert not kinds & {"error", "stderr"}
-
-    def test_is_small_and_carries_no_trace_of_the_machine(self, path):
-        notebook = nbformat.read(path, as_version=4)
         assert path.stat().st_size < 1_000_000
         assert notebook.metadata.kernelspec.name == "python3"
         assert not any(cell.metadata for cell in notebook.cells)

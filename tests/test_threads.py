@@ -92,7 +92,9 @@ def test_solves_sweeps_and_fits_at_once_answer_as_alone(tmp_path):
         assert all(map(np.array_equal, found, alone))
 
 
-def test_lapack_has_one_thread_while_a_strip_is_solved(monkeypatch):
+def test_lapack_has_one_thread_while_a_strip_is_solved_and_is_left_as_it_was(monkeypatch):
+    """Also where two threads overlap, of which who comes first leaves first."""
+
     def threads():
         return {library["num_threads"] for library in threadpool_info()}
 
@@ -102,11 +104,6 @@ def test_lapack_has_one_thread_while_a_strip_is_solved(monkeypatch):
         monkeypatch.delenv(VARIABLE, raising=False)
         assert asked() == {1}
         assert threads() == {2}
-
-
-def test_threads_at_once_leave_lapack_as_it_was(monkeypatch):
-    """Who comes first leaves first."""
-    monkeypatch.delenv(VARIABLE, raising=False)
     inside, go_on, before = threading.Barrier(2), threading.Event(), threadpool_info()
 
     def last():

@@ -27,6 +27,7 @@ def joint(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_a_face_has_a_loop_and_maps(joint, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["bodies", joint(), "--amplitude", "1000", "--json", "--out", str(out)]) == 0
@@ -44,6 +45,7 @@ def test_a_face_has_a_loop_and_maps(joint, tmp_path, capsys):
     assert np.sum(pressed["normal_force"]) == pytest.approx(16e3)  # of both bolts
 
 
+@pytest.mark.slow
 def test_a_mode_has_a_backbone(joint, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["bodies", joint(), "--mode", "0", "--json", "--out", str(out)]) == 0
@@ -53,26 +55,24 @@ def test_a_mode_has_a_backbone(joint, tmp_path, capsys):
     assert {path.name for path in out.iterdir()} == {"backbone.csv", "result.json", "backbone.png"}
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('face = "FACE"\npress', 'face = "FLANGE"\npress', "upper.face: surface = 'FLANGE': is"),
-        ('"BOLT_2"', '"BOLT_3"', "upper.press[1]: surface = 'BOLT_3': is none of the deck's: FACE"),
-        ('deck = "lower.inp"', 'deck = "none.inp"', "none.inp"),
-        ('deck = "lower.inp"', 'deck = "upper.inp"', "lower.face = 'FACE': faces away"),
-        ("direction = 1", "direction = 4", "upper.pull.direction = 4"),
-        ('{ surface = "END", direction = 1 }', '"END"', "upper.pull = 'END': write pull = {"),
-        ("friction = 0.2", "frictoin = 0.2", "key frictoin"),
-        ('deck = "lower.inp"', 'deck = "lower.inp"\nelements = [[1]]', "lower.elements = "),
-        ('deck = "lower.inp"', 'deck = "lower.inp"\ncolour = 1', "lower.colour = 1: keys are deck"),
-    ],
-)
-def test_a_bad_file_is_refused_in_one_line(joint, capsys, old, new, words):
-    assert main(["bodies", joint(old, new)]) == 2
-    assert words in capsys.readouterr().err
+BAD = [
+    ('face = "FACE"\npress', 'face = "FLANGE"\npress', "upper.face: surface = 'FLANGE': is"),
+    ('"BOLT_2"', '"BOLT_3"', "upper.press[1]: surface = 'BOLT_3': is none of the deck's: FACE"),
+    ('deck = "lower.inp"', 'deck = "none.inp"', "none.inp"),
+    ('deck = "lower.inp"', 'deck = "upper.inp"', "lower.face = 'FACE': faces away"),
+    ("direction = 1", "direction = 4", "upper.pull.direction = 4"),
+    ('{ surface = "END", direction = 1 }', '"END"', "upper.pull = 'END': write pull = {"),
+    ("friction = 0.2", "frictoin = 0.2", "key frictoin"),
+    ('deck = "lower.inp"', 'deck = "lower.inp"\nelements = [[1]]', "lower.elements = "),
+    ('deck = "lower.inp"', 'deck = "lower.inp"\ncolour = 1', "lower.colour = 1: keys are deck"),
+]
 
 
-def test_a_deck_without_matrices_says_what_to_run(joint, tmp_path, capsys):
+def test_a_bad_file_is_refused_in_one_line(joint, tmp_path, capsys):
+    for old, new, words in BAD:
+        assert main(["bodies", joint(old, new)]) == 2
+        assert words in capsys.readouterr().err
+    joint()
     (tmp_path / "lap" / "upper.npz").unlink()
     assert main(["bodies", joint()]) == 2
     said = "upper.deck = 'upper.inp': there is no upper.sti and no upper.npz: run ccx on the deck"

@@ -109,6 +109,7 @@ def test_fit_prints_text_to_read(cli, planted):
     ]
 
 
+@pytest.mark.slow
 def test_python_and_the_command_line_are_one_door(cli, tmp_path):
     """A file and its loops: the same starts, numbers, doubts and notes, with nothing given."""
     rows = np.column_stack(rig_file(np.random.default_rng(3)))
@@ -218,22 +219,19 @@ def test_without_data_the_example_is_fitted(asked):
     assert scene.load.amplitude == 1.6
 
 
-@pytest.mark.parametrize(
-    ("words", "start"),
-    [
-        (["--free", "contact.friction"], [0.15, 0.1126]),
-        (["--free", "strip.kappa_s"], [0.1, 0.1126]),
-        (["--set", "contact.friction=0.3"], [0.3, 0.2]),
-        (["--set", "contact.friction=0.3", "--start", "contact.friction=0.4"], [0.4, 0.2]),
-        (["--set", "strip.half_height=0.05"], [0.15, 0.05]),
-        (["--start", "strip.height_ratio=0.3", "--set", "strip.half_height=0.05"], [0.15, 0.3]),
-    ],
-)
-def test_starts_go_before_settings_before_the_example(asked, words, start):
-    assert numbers(asked(*words)[1]) == start
+STARTS = [
+    (["--free", "contact.friction"], [0.15, 0.1126]),
+    (["--free", "strip.kappa_s"], [0.1, 0.1126]),
+    (["--set", "contact.friction=0.3"], [0.3, 0.2]),
+    (["--set", "contact.friction=0.3", "--start", "contact.friction=0.4"], [0.4, 0.2]),
+    (["--set", "strip.half_height=0.05"], [0.15, 0.05]),
+    (["--start", "strip.height_ratio=0.3", "--set", "strip.half_height=0.05"], [0.15, 0.3]),
+]
 
 
-def test_a_scene_file_goes_before_the_example(asked, tmp_path):
+def test_starts_go_before_settings_before_files_before_the_example(asked, tmp_path):
+    for words, start in STARTS:
+        assert numbers(asked(*words)[1]) == start
     scene = tmp_path / "scene.toml"
     scene.write_text("[contact]\nfriction = 0.25\n[load]\namplitude = 0.5\n")
     got = asked("--scene", scene)[1]
@@ -241,48 +239,27 @@ def test_a_scene_file_goes_before_the_example(asked, tmp_path):
     assert got.load.amplitude == 0.5
 
 
-@pytest.fixture(scope="module")
-def noisy(tmp_path_factory):
-    """A smooth displacement to 0.002 and a noisy force."""
+def test_the_smooth_column_drives_unless_one_is_set(asked, tmp_path):
     phase = np.linspace(0.0, 2.0 * np.pi, 200)
     noise = 0.02 * np.random.default_rng(5).standard_normal(phase.size)
     table = np.column_stack([np.cos(phase + 0.3) + noise, 0.002 * np.cos(phase)])
-    path = tmp_path_factory.mktemp("noisy") / "rig.csv"
+    path, scene = tmp_path / "rig.csv", tmp_path / "scene.toml"
     np.savetxt(path, table, delimiter=",", header="force,displacement", comments="")
-    return path
-
-
-def test_the_smooth_column_drives(asked, noisy, tmp_path):
-    free = ("--free", "contact.friction")
-    load = asked(noisy, *free)[1].load
-    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
-    load = asked(noisy, *free, "--set", "load.control=displacement")[1].load
-    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
-    load = asked(noisy, *free, "--set", "load.control=force")[1].load
-    assert load.control == "force"
-    assert float(load.amplitude) == pytest.approx(max(read_loops(noisy)[0].force), rel=0.1)
-    scene = tmp_path / "scene.toml"
     scene.write_text("[load]\ncontrol = 'force'\namplitude = 0.5\n")
-    load = asked(noisy, *free, "--scene", scene)[1].load
+    free = (path, "--free", "contact.friction")
+    load = asked(*free)[1].load
+    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
+    load = asked(*free, "--set", "load.control=force")[1].load
+    assert float(load.amplitude) == pytest.approx(max(read_loops(path)[0].force), rel=0.1)
+    load = asked(*free, "--scene", scene)[1].load
     assert (load.control, float(load.amplitude)) == ("force", 0.5)
-
-
-def test_the_control_that_is_set_decides_how_cycles_are_averaged(asked, tmp_path):
-    u = rig.path(3)
+    u = rig.path(3)  # cycles, which are averaged along the column that drives
     rows = np.column_stack([7.0 * rig.jenkins(u), 1e-4 * u])
     head = "force [N/m],displacement [m]"
-    np.savetxt(tmp_path / "rig.csv", rows, delimiter=",", header=head, comments="")
-    words = (tmp_path / "rig.csv", "--free", "contact.friction")
-    for further, driver in (
-        ((), "displacement"),
-        (("--set", "load.control=displacement"), "displacement"),
-        (("--set", "load.control=force"), "force"),
-    ):
-        (loop,), scene, _ = asked(*words, *further)
-        assert (loop.driver, scene.load.control) == (driver, driver)
-
-
-# --- bad input ----------------------------------------------------------------------------------
+    np.savetxt(path, rows, delimiter=",", header=head, comments="")
+    for words, driver in (((), "displacement"), (("--set", "load.control=force"), "force")):
+        (loop,), one, _ = asked(*free, *words)
+        assert (loop.driver, one.load.control) == (driver, driver)
 
 
 @pytest.mark.slow

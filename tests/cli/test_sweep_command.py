@@ -3,6 +3,7 @@
 import csv
 import json
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -24,45 +25,40 @@ AMPLITUDES = ("--over", "load.amplitude=0.5:2.5:3")
 HEIGHTS = ("--over", "strip.height_ratio=0.05, .4")
 
 
-@pytest.mark.parametrize(
-    ("text", "values"),
-    [
-        ("load.amplitude=1:3:5", [1.0, 1.5, 2.0, 2.5, 3.0]),
-        ("load.amplitude=3:1:2", [3.0, 1.0]),
-        ("load.amplitude = 0.1 : 10 : 3 : log", [0.1, 1.0, 10.0]),
-        ("load.amplitude=.5", [0.5]),
-        ("load.amplitude=1,2e-1, 3", [1.0, 0.2, 3.0]),
-        ("load.amplitude=2:7:1", [2.0]),
-    ],
-)
-def test_ranges_are_what_they_say(text, values):
-    np.testing.assert_allclose(ranges([text])["load.amplitude"], values, rtol=1e-14)
+RANGES = {
+    "load.amplitude=1:3:5": [1.0, 1.5, 2.0, 2.5, 3.0],
+    "load.amplitude=3:1:2": [3.0, 1.0],
+    "load.amplitude = 0.1 : 10 : 3 : log": [0.1, 1.0, 10.0],
+    "load.amplitude=.5": [0.5],
+    "load.amplitude=1,2e-1, 3": [1.0, 0.2, 3.0],
+    "load.amplitude=2:7:1": [2.0],
+}
+NO_RANGES = {
+    "": "at least one key",
+    "load.amplitude": "write KEY=START:STOP:COUNT",
+    "load.amplitud=1:2:3": "did you mean 'load.amplitude'",
+    "load.amplitude=": "is empty",
+    "load.amplitude=1:2:0": "is empty; COUNT",
+    "load.amplitude=1:2:-3": "is empty; COUNT",
+    "load.amplitude=1:2:2.5": "COUNT must be a whole number",
+    "load.amplitude=1:2": "write KEY",
+    "load.amplitude=1:2:3:cubic": "write KEY",
+    "load.amplitude=0:2:3:log": "must be positive for a log range",
+    "load.amplitude=1,,2": "'' is not a finite number",
+    "load.amplitude=1,two": "'two' is not a finite number",
+    "load.amplitude=0:inf:3": "'inf' is not a finite number",
+    "load.amplitude=0:1:99999999999": "99,999,999,999 lanes .* take",
+    "load.amplitude=1 load.amplitude=2": "is given twice",
+}
 
 
-@pytest.mark.parametrize(
-    ("texts", "says"),
-    [
-        ([], "at least one key"),
-        (["load.amplitude"], "write KEY=START:STOP:COUNT"),
-        (["load.amplitud=1:2:3"], "did you mean 'load.amplitude'"),
-        (["load.amplitude="], "is empty"),
-        (["load.amplitude=1:2:0"], "is empty; COUNT"),
-        (["load.amplitude=1:2:-3"], "is empty; COUNT"),
-        (["load.amplitude=1:2:2.5"], "COUNT must be a whole number"),
-        (["load.amplitude=1:2"], "write KEY"),
-        (["load.amplitude=1:2:3:cubic"], "write KEY"),
-        (["load.amplitude=0:2:3:log"], "must be positive for a log range"),
-        (["load.amplitude=1,,2"], "'' is not a finite number"),
-        (["load.amplitude=1,two"], "'two' is not a finite number"),
-        (["load.amplitude=0:inf:3"], "'inf' is not a finite number"),
-        (["load.amplitude=0:1:99999999999"], "99,999,999,999 lanes .* take"),
-        (["load.amplitude=1", "load.amplitude=2"], "is given twice"),
-    ],
-)
-def test_ranges_that_are_none_are_refused_in_one_line(texts, says):
-    with pytest.raises(InputError, match=says) as caught:
-        ranges(texts)
-    assert "\n" not in str(caught.value)
+def test_ranges_are_what_they_say_or_refused_in_one_line():
+    for text, values in RANGES.items():
+        np.testing.assert_allclose(ranges([text])["load.amplitude"], values, rtol=1e-14)
+    for text, says in NO_RANGES.items():
+        with pytest.raises(InputError, match=says) as caught:
+            ranges(text.split())
+        assert "\n" not in str(caught.value)
 
 
 def test_json_is_strict_and_files_hold_the_same(cli, tmp_path):
@@ -123,53 +119,42 @@ def made_up(control="force", paired=False, **over):
 AXES = {"load.amplitude": np.linspace(0.1, 1.9, 7), "strip.height_ratio": [0.05, 0.1, 0.2]}
 
 
-@pytest.fixture
-def pyplot():
-    plt = pytest.importorskip("matplotlib.pyplot")
-    yield plt
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
     plt.close("all")
 
 
-def test_a_curve_for_every_height_and_the_bar_for_all(pyplot):
+def test_a_curve_for_every_height_and_the_bar_for_all():
     result = made_up(**AXES, **{"contact.friction": [0.1, 0.2]})
     axes = plotting.sweep(result, per="strip.height_ratio")
-    curves = axes.lines
-    assert len(curves) == 3  # friction varies: no one bar for all
-    np.testing.assert_array_equal(curves[1].get_ydata(), result["dissipation"][:, 1, 1])
+    assert len(axes.lines) == 3  # friction varies: no one bar for all
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), result["dissipation"][:, 1, 1])
     assert axes.get_title() == r"$\mu$ = 0.2"
     assert "force/width" in axes.get_xlabel()
     bar = plotting.sweep(made_up(**AXES)).lines[-1]
     assert bar.get_label() == "bar"
     assert np.all(np.diff(bar.get_ydata()) > 0.0)
-    assert len(plotting.sweep(made_up("displacement", **AXES)).lines) == 3
-    turned = plotting.sweep(
-        result, figure="dissipation_ratio", along="contact.friction", per="load.amplitude"
-    )
-    assert len(turned.lines) == 7
-    with pytest.raises(InputError, match="the sweep is over"):
-        plotting.sweep(result, along="strip.length")
-    with pytest.raises(InputError, match="along the axis already"):
-        plotting.sweep(result, along="contact.friction", per="contact.friction")
-    with pytest.raises(InputError, match="choose"):
-        plotting.sweep(result, figure="loss_factor")
+    refused = {
+        "the sweep is over": {"along": "strip.length"},
+        "along the axis already": {"along": "contact.friction", "per": "contact.friction"},
+        "choose": {"figure": "loss_factor"},
+    }
+    for says, words in refused.items():
+        with pytest.raises(InputError, match=says):
+            plotting.sweep(result, **words)
+    paired = AXES | {"strip.height_ratio": np.geomspace(0.05, 0.4, 7)}
+    axes = plotting.sweep(made_up(paired=True, **paired))
+    assert len(axes.collections[0].get_offsets()) == 7
+    assert len(axes.figure.axes) == 2  # with a bar of colours
 
 
-def test_the_master_curve_has_a_dot_for_every_lane_that_converged(pyplot):
+def test_the_master_curve_has_a_dot_for_every_lane_that_converged():
     result = made_up(**AXES)
-    axes = plotting.master_curve(result)
-    (dots,) = axes.collections
+    (dots,) = plotting.master_curve(result).collections
     x, y = np.asarray(dots.get_offsets()).T
     assert x.size == result["status"].size - 1
     np.testing.assert_allclose(y, x / 2.0 / (1.0 + x / 2.0))
     assert x.max() == pytest.approx(1.9 / 0.05)
     with pytest.raises(InputError, match="no lane with a force"):
         plotting.master_curve(made_up("displacement", **AXES))
-
-
-def test_pairs_are_dots(pyplot):
-    heights = np.geomspace(0.05, 0.4, 7)
-    result = made_up(paired=True, **AXES | {"strip.height_ratio": heights})
-    axes = plotting.sweep(result)
-    assert len(axes.collections[0].get_offsets()) == 7
-    assert len(axes.figure.axes) == 2  # with a bar of colours
-    assert not plotting.sweep(made_up(paired=True, **{"load.amplitude": [0.5, 1.0]})).collections

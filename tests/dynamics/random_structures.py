@@ -1,15 +1,10 @@
 """Random structures with joints, and what brute force says of them.
 
-    python tests/dynamics/random_structures.py 200
-
-prints the results that are off by more than 2 % without an error or a doubt, and how many were
-doubted in vain.  References are sums over cycles of sliders, and leapfrog integration in time with
+References are sums over cycles of sliders, and leapfrog integration in time with
 the exact law of the sliders, in NumPy.
 """
 
-import sys
 import warnings
-from collections import Counter
 
 import jax.numpy as jnp
 import numpy as np
@@ -290,25 +285,6 @@ def checked_motion(draw):
     return np.max(np.abs(motion.displacement - wanted)) / np.max(np.abs(wanted))
 
 
-def checked_ring_down(draw):
-    """Error of the energy that a ring-down has lost, after half of it."""
-    structure = random_structure(draw)
-    brute = Brute(structure)
-    brute.u = np.zeros(structure.directions.shape[1])
-    modes = structure.modes(1)
-    speed = modes.omega[0] * amplitudes(draw, structure)[-1] * modes.shapes[:, 0]
-    motion = dynamics.shake(structure, 5.0 * brute.longest, velocity=speed, samples=201)
-    lost = motion.friction_work + motion.damping_work
-    path = brute.motion(0.0 * speed, speed, 5.0 * brute.longest)
-    h = 5.0 * brute.longest / (len(path) - 1)
-    v = (path[2:] - path[:-2]) / (2.0 * h)
-    kinetic = 0.5 * np.sum(brute.mass * v**2, axis=1)
-    at = np.linspace(0.0, len(path) - 1, 201)[1:-1]
-    wanted = np.interp(at, np.arange(1, len(path) - 1), kinetic)
-    off = np.max(np.abs(motion.kinetic[1:-1] - wanted)) / motion.kinetic[0]
-    return max(off, np.max(np.abs(motion.imbalance)) / max(lost[-1], 0.01 * motion.kinetic[0]))
-
-
 CHECKS = {
     "joint": checked_joint,
     "law": checked_law,
@@ -316,7 +292,6 @@ CHECKS = {
     "curve": checked_curve,
     "response": checked_response,
     "motion": checked_motion,
-    "ring-down": checked_ring_down,
 }
 
 
@@ -337,22 +312,3 @@ def verdict(name, seed):
         (False, True): "doubted in vain",
         (False, False): "right",
     }[off, doubted]
-
-
-def main():
-    count = int(sys.argv[1])
-    chosen = sys.argv[2:] or list(CHECKS)
-    for name in chosen:
-        met = Counter()
-        for seed in range(count):
-            error, words = verdict(name, seed)
-            met[words] += 1
-            print(f"  {name} {seed}: {words}, off by {error:.2%}", flush=True)
-        print(name, dict(met), flush=True)
-
-
-if __name__ == "__main__":
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    main()

@@ -11,7 +11,6 @@ from toy import STRIP
 import jbeamshell as jb
 from jbeamshell import dynamics
 from jbeamshell.dynamics.strip.equations import Equations
-from jbeamshell.load_steps.system import V
 from jbeamshell.mechanics.homogeneous import shear_coefficient
 
 build = eqx.filter_jit(Equations)  # one program instead of hundreds
@@ -80,7 +79,7 @@ def cantilever(strip):
 
 def test_a_cantilever_vibrates_as_timoshenkos():
     errors = []
-    for nodes in (21, 41):
+    for nodes in (11, 21):
         strip = scene(
             model__section="shell",
             model__nodes=nodes,
@@ -95,7 +94,9 @@ def test_a_cantilever_vibrates_as_timoshenkos():
 
 def test_a_strip_on_a_rigid_base_is_held_down_in_motion():
     held, rigid, soft = (
-        dynamics.modes(scene(contact__normal=base, contact__normal_stiffness=0.1)).frequency[0]
+        dynamics.modes(
+            scene(model__nodes=11, contact__normal=base, contact__normal_stiffness=0.1)
+        ).frequency[0]
         for base in ("held", "rigid", "compliant")
     )
     assert held == rigid
@@ -146,6 +147,7 @@ def test_exact_kinematics_keep_energy_and_momentum_of_a_turning_section():
     assert abs(ahead - behind) / (2.0 * step) < 1e-6 * energy
 
 
+@pytest.mark.slow
 def test_reaction_has_elasticity_and_inertia():
     strip = scene(model__nodes=11)
     shaker = dynamics.Shaker(3.0, 0.25, direction="across")
@@ -158,4 +160,3 @@ def test_reaction_has_elasticity_and_inertia():
     weight = 2.0 * float(strip.strip.half_height) * RHO * 3.0
     assert np.all(shaken > still)
     assert np.allclose((shaken - still) / weight, 0.25, atol=0.02)
-    assert V == 0

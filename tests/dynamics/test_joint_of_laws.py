@@ -10,13 +10,10 @@ from jbeamshell import laws
 from jbeamshell.dynamics import Attachment, Joint, Structure, modal_curve
 
 MASING = {
-    "jenkins": laws.Jenkins(2.0, 100.0),
     "sliders": laws.law_named("sliders3")(0.01, 0.05, 0.6, 0.9, 0.5),
     "iwan4": laws.Iwan4(2.0, 100.0, -0.5, 0.3),
     "iwan4, steep": laws.Iwan4(2.0, 100.0, -0.9, 0.0),
-    "iwan4, even": laws.Iwan4(2.0, 100.0, 0.0, 2.0),
     "bar": laws.Bar(2.0, 0.05),
-    "mindlin": laws.Mindlin(2.0, 100.0),
 }
 
 
@@ -32,16 +29,14 @@ def test_a_joint_has_the_loops_of_its_law(name):
     path = slides * np.array([0.5, -0.3, 0.2, -0.1, 0.9, -1.2, 0.1, 1.3])
     forces = 3.0 * np.asarray(law.path_forces(path))
     np.testing.assert_allclose(joint.path_forces(path), forces, rtol=0.0, atol=1.2e-2)
-    exact = isinstance(law, laws.Jenkins | laws.parallel_iwan.Sliders)
-    assert not exact or np.max(np.abs(np.asarray(joint.path_forces(path)) - forces)) < 1e-12
+    assert name != "sliders" or np.max(np.abs(np.asarray(joint.path_forces(path)) - forces)) < 1e-12
     u = joint.displacement(jnp.asarray([0.6, 3.0]))
     np.testing.assert_allclose(joint.backbone(u), [0.6, 3.0], rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["iwan4", "mindlin"])
-def test_a_joint_has_the_slopes_of_its_law(name):
+def test_a_joint_has_the_slopes_of_its_law():
     """Relative changes of the energy with each number, between the points as well."""
-    law = MASING[name]
+    law = MASING["iwan4"]
     size = float(Joint.of(law).displacements[-2]) * np.geomspace(1e-3, 0.999, 57)
     lost = np.asarray(law.dissipation(size))[:, None]
 
@@ -52,7 +47,7 @@ def test_a_joint_has_the_slopes_of_its_law(name):
         def loss(values):
             return of(law.replace(dict(zip(keys, values, strict=True)))).dissipation(size)
 
-        return np.asarray(jax.jacfwd(loss)(start)) * np.asarray(start) / lost
+        return np.asarray(jax.jit(jax.jacfwd(loss))(start)) * np.asarray(start) / lost
 
     np.testing.assert_allclose(slopes(Joint.of), slopes(lambda law: law), rtol=0.03, atol=5e-3)
 
@@ -64,8 +59,8 @@ def test_a_structure_takes_a_law_as_its_joint_with_derivatives_to_its_numbers():
         law = laws.Jenkins(limit, 4.0)
         return modal_curve(Structure([[1.0]], [[0.0]], [Attachment(law, 0)]), [1.0]).frequency[0]
 
-    assert float(jax.jit(frequency)(1.5)) == pytest.approx(1.5**0.5 / (2.0 * np.pi), rel=1e-9)
-    slope = jax.grad(frequency)(1.5)
+    found, slope = jax.jit(jax.value_and_grad(frequency))(1.5)
+    assert float(found) == pytest.approx(1.5**0.5 / (2.0 * np.pi), rel=1e-9)
     assert float(slope) == pytest.approx(0.5 / 1.5**0.5 / (2.0 * np.pi), rel=1e-9)
 
 
@@ -78,10 +73,10 @@ def test_a_force_below_gross_slip_ends_the_joint_there():
         joint.displacement(1.5)
 
 
-@pytest.mark.parametrize("name", ["bouc-wen", "dahl", "lugre", "jang-barber"])
-def test_a_law_without_masings_memory_is_refused(name):
-    with pytest.raises(jb.InputError, match=f"^law = '{name}': has no Masing memory.*take iwan4"):
-        Structure([[1.0]], [[1.0]], [Attachment(laws.LAWS[name](), 0)])
+def test_a_law_without_masings_memory_is_refused():
+    for name in ("bouc-wen", "dahl", "lugre", "jang-barber"):
+        with pytest.raises(jb.InputError, match=f"^law = '{name}': has no Masing memory.*iwan4"):
+            Structure([[1.0]], [[1.0]], [Attachment(laws.LAWS[name](), 0)])
 
 
 class Held(laws.law_named("sliders2")):
@@ -101,6 +96,7 @@ def test_a_law_that_rises_for_ever_needs_a_force():
     assert float(Joint.of(held, 3.0).forces[-1]) == pytest.approx(3.0)
 
 
+@pytest.mark.slow
 def test_the_joint_of_a_plain_scene_loses_what_a_plain_call_does_at_small_amplitudes():
     # The squeeze section, which serves the scene's own amplitude, loses 18 times as much at .1.
     scene = jb.Scene()

@@ -9,7 +9,7 @@ from jbeamshell.dynamics import Joint
 from jbeamshell.dynamics.release import LIGHT, let_go, on_contact_line
 
 SCENE = jb.Scene().replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
-CYCLES = 20.0
+CYCLES = 12.0
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ class TestLetGo:
         assert study.share < LIGHT
         assert study.figures()["strip"] == "network of sliders"
         late = study.found.damping < 0.02
-        assert late.sum() > 15
+        assert late.sum() > 8
         # A ring-down fits frequency and damping over a few swings, in which both change.
         assert np.median(np.abs(study.ratio[late] - 1.0)) < 0.1
 
@@ -50,13 +50,10 @@ class TestLetGo:
             let_go(SCENE, 1.0, payload=1.0, cycles=CYCLES)
         assert let_go(SCENE, 1.0, payload=1.0, cycles=CYCLES, whole=False).light
 
-    @pytest.mark.parametrize(
-        ("section", "found"),
-        [("auto", "plane"), ("plane", "plane"), ("squeeze", "squeeze"), ("bar", "bar")],
-    )
-    def test_the_sliders_are_those_of_the_section_or_of_plane_elasticity(self, section, found):
-        line = on_contact_line(jb.Scene().replace({"model.section": section}))
-        assert found == (None if line is None else line.plan.section)
+    def test_the_sliders_are_those_of_the_section_or_of_plane_elasticity(self):
+        for section in ("auto", "plane", "squeeze", "bar"):
+            line = on_contact_line(jb.Scene().replace({"model.section": section}))
+            assert line.plan.section == ("plane" if section == "auto" else section)
 
     def test_a_strip_without_sliders_is_refused_where_one_is_asked_for(self):
         smooth = STRIP.replace({"contact.smoothing": 8.0, "model.nodes": 11})

@@ -43,6 +43,10 @@ class TestJoint:
         loop, path = forces[119:], np.concatenate([up[-1:], down, -down])
         area = np.trapezoid(loop, path)
         assert area == pytest.approx(float(JOINT.dissipation(1.7)), rel=1e-3)
+        work = np.trapezoid(JOINT.backbone(fine := np.linspace(0.0, 1.7, 20001)), fine)
+        assert float(JOINT.work(-1.7)) == pytest.approx(work, rel=1e-6)
+        masing = 8.0 * work - 4.0 * 1.7 * float(JOINT.backbone(1.7))
+        assert float(JOINT.dissipation(1.7)) == pytest.approx(masing, rel=1e-6)
 
     def test_a_bars_energy_per_cycle_is_goodmans(self):
         u = jnp.array([0.05, 0.2, 0.45])
@@ -50,11 +54,8 @@ class TestJoint:
         first = BAR.first_harmonic(u)
         assert np.allclose(np.pi * first.imag * u**2, BAR.dissipation(u), rtol=1e-12)
         assert np.all(np.diff(first.real) < 0.0)
-
-    def test_an_elastic_joint_has_its_stiffness_as_first_harmonic(self):
-        assert complex(JOINT.first_harmonic(jnp.asarray(0.01))) == pytest.approx(
-            float(JOINT.stiffness), rel=1e-6
-        )
+        stuck = complex(JOINT.first_harmonic(jnp.asarray(0.01)))
+        assert stuck == pytest.approx(float(JOINT.stiffness), rel=1e-6)
 
     def test_a_strips_loops_are_its_own(self):
         """The path of the displacement gives back any path of nested reversals of the force."""
@@ -64,7 +65,7 @@ class TestJoint:
         # A loop within a loop closes where its load comes back; driven by u, where its u does.
         np.testing.assert_allclose(joint.path_forces(u), 3.0 * np.array(LOADS), atol=0.01)
 
-    @pytest.mark.parametrize("entry", ["traction", "face", "member", "guided"])
+    @pytest.mark.parametrize("entry", ["traction", "member"])
     def test_a_strips_cycles_are_its_own(self, entry):
         """Short slip, a tall strip: the nodes' own thresholds would be off by factors."""
         tall = {"strip.height_ratio": 0.34, "contact.friction": 0.2, "strip.poisson_ratio": 0.16}
@@ -87,14 +88,6 @@ class TestJoint:
         loss = JOINT.dissipation(u)
         np.testing.assert_allclose(springy.dissipation(u + force / 2.0), loss, rtol=1e-9)
         assert float(springy.stiffness) == pytest.approx(1.0 / (1.0 / float(JOINT.stiffness) + 0.5))
-
-    def test_energy_per_cycle_is_masings(self):
-        u = np.linspace(0.01, 5.0, 30)
-        fine = np.linspace(0.0, 1.0, 20001)
-        work = np.array([np.trapezoid(np.asarray(JOINT.backbone(x * fine)), x * fine) for x in u])
-        loss = 8.0 * work - 4.0 * u * np.asarray(JOINT.backbone(u))
-        np.testing.assert_allclose(JOINT.dissipation(u), loss, rtol=1e-6, atol=1e-8)
-        np.testing.assert_allclose(JOINT.work(-u), work, rtol=1e-6)
 
     @pytest.mark.slow
     @pytest.mark.parametrize("name", ["lap", "bar"])
@@ -122,14 +115,6 @@ class TestJoint:
         )
 
     @pytest.mark.slow
-    def test_a_bar_of_load_steps_has_goodmans_energy(self):
-        bar = STRIP.replace({"model.section": "bar", "model.nodes": 101}).by_load_steps()
-        joint = Joint.of(bar, 1.2)
-        u = 0.5 * float(joint.displacements[-1])
-        force = float(joint.backbone(u))
-        assert float(joint.dissipation(u)) == pytest.approx(2.0 / 3.0 * force**3 / 3.4e4, rel=0.01)
-
-    @pytest.mark.slow
     def test_a_strip_of_load_steps_has_its_own_steady_cycles(self):
         coarse = {"model.kinematics": "linear", "model.nodes": 21, "contact.normal": "held"}
         strip = STRIP.replace(coarse)
@@ -151,17 +136,19 @@ BEYOND = {
     "path": lambda: SHORT.path_forces([1.0, -4.5]),
     "curve": lambda: modal_curve(chain(joint=SHORT), [0.1, 9.0]),
     "series": lambda: SHORT.in_series(1.0).backbone(5.5),
-    "strip": lambda: Joint.of(PLANE, 1.2).dissipation(1e-3),
 }
 
 
 class TestReach:
     """A joint is known up to its last point; at gross slip the force stays."""
 
-    @pytest.mark.parametrize("name", BEYOND)
-    def test_beyond_the_last_point_nothing_is_known(self, name):
-        with pytest.raises(jb.InputError, match=r"beyond its backbone, which ends at.*take less"):
-            BEYOND[name]()
+    def test_beyond_the_last_point_nothing_is_known(self):
+        for ask in BEYOND.values():
+            with pytest.raises(jb.InputError, match=r"beyond its backbone, which ends at.*take le"):
+                ask()
+        inside, beyond = jax.jit(lambda u: SHORT.dissipation(u))(jnp.array([1.0, 5.0]))
+        assert np.isfinite(inside)
+        assert np.isnan(beyond)
 
     def test_a_motion_ends_where_the_joint_is_not_known(self):
         with pytest.raises(dynamics.InterruptedMotionError, match=r"attachments\[0\]") as cut:
@@ -170,60 +157,28 @@ class TestReach:
         assert 0.0 < cut.value.motion.reached < 20.0
         assert np.max(np.abs(cut.value.motion.displacement[known, 0])) <= 4.0
 
-    def test_traced_displacements_beyond_give_nan(self):
-        inside, beyond = jax.jit(lambda u: SHORT.dissipation(u))(jnp.array([1.0, 5.0]))
-        assert np.isfinite(inside)
-        assert np.isnan(beyond)
-        curve = jax.jit(lambda k: modal_curve(chain(joint=Joint(k * U, jnp.tanh(U))), [0.1, 9.0]))
-        assert np.isfinite(curve(1.0).damping[0])
-        assert np.isnan(curve(1.0).damping[1])
-
-    @pytest.mark.doubtful("damping may be off")
     def test_a_joint_that_was_followed_to_gross_slip_slides(self):
         joint = Joint.of(PLANE, 1.99, width=3.0)
         end = float(joint.displacements[-2])
-        assert float(joint.backbone(50.0 * end)) == pytest.approx(3.0 * 1.99, rel=1e-9)
+        np.testing.assert_allclose(joint.backbone(jnp.array([9.0, 50.0]) * end), 5.97, rtol=1e-9)
         slid = float(joint.dissipation(9.0 * end) - joint.dissipation(end))
         assert slid == pytest.approx(4.0 * 3.0 * 1.99 * 8.0 * end, rel=1e-9)
         both = joint.backbone(jnp.array([9.0, -9.0]) * end, mean=False)
         np.testing.assert_allclose(both, [5.97, -5.97], rtol=1e-9)
-        mass = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
-        far = modal_curve(mass, [2.0 * end, 50.0 * end])
-        assert float(far.omega[1] ** 2) == pytest.approx(5.97 / (50.0 * end), rel=1e-9)
 
 
 class TestModes:
-    def test_they_print_as_a_short_table(self):
+    def test_they_are_those_of_a_row_of_masses_and_print_short(self):
         """Springs of unit stiffness in a row of masses of 1: omega = 2 sin(pi j/2 (n + 1))."""
         n = 12
         modes = Structure(np.eye(n), 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)).modes(n)
         first, second, *_, last = str(modes).splitlines()
         assert first == "natural modes, cycles per time"
-        assert second.split()[:2] == ["mode", "0"]
         expected = np.sin(0.5 * np.pi / (n + 1)) / np.pi
         assert float(second.split()[2]) == pytest.approx(expected, rel=1e-5)
         assert last.strip() == "and 2 more"
-
-    def test_statics_doubt_themselves_where_they_are_off(self):
-        """Three masses whose second mode has nearly three times the frequency of the first."""
-        joint = Joint.of(PLANE, 1.99)
-        stiff = float(joint.stiffness)
-        spring = 0.5 * stiff * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
-        structure = Structure(20.0 * np.eye(3), spring, [Attachment(joint, 0)])
-        small = 0.02 * float(joint.displacements[-2]) * np.sqrt(20.0)
-        assert modal_curve(structure, [0.1 * small]).doubts == ()
-        with pytest.warns(jb.DoubtfulWarning, match="damping may be off by.*take nonlinear_mode"):
-            curve = modal_curve(structure, [small, 20.0 * small])
-        mode = dynamics.nonlinear_mode(structure, small * np.geomspace(1.0, 20.0, 5))
-        off = curve.damping[-1] / mode.damping[-1] - 1.0
-        assert 0.02 < abs(off) < abs(curve.damping_error[-1])
-
-    def test_results_print_few_lines(self):
-        curve = modal_curve(chain(), [0.01, 0.02])
-        for found in (JOINT, curve):
-            assert str(found).count("\n") < 8
         assert str(JOINT).startswith("joint of 40 sliders")
-        assert curve.plot()[0].get_xlabel().startswith("modal displacement")
+        assert str(JOINT).count("\n") < 8
 
     @pytest.mark.doubtful("damping may be off")
     def test_one_mass_is_the_joint_itself(self):
@@ -245,23 +200,22 @@ class TestModes:
         assert np.allclose(one.frequency, other.frequency, rtol=1e-9)
         assert np.allclose(one.damping, other.damping, rtol=1e-6)
 
-    def test_small_motion_is_undamped_and_stuck(self):
-        curve = modal_curve(chain(), [1e-4, 1e-3])
-        assert np.allclose(curve.frequency, chain().modes().frequency[0], rtol=1e-9)
+    def test_small_motion_has_the_damping_of_the_structure(self):
+        small, plain = [1e-4, 1e-3], chain()
+        curve = modal_curve(plain, small)
+        assert np.allclose(curve.frequency, plain.modes().frequency[0], rtol=1e-9)
         assert np.all(curve.damping < 1e-9)
-
-    @pytest.mark.parametrize("ratio", [0.02, [0.01, 0.03]])
-    def test_small_motion_has_the_damping_of_the_structure(self, ratio):
-        small = [1e-4, 1e-3]
-        plain = chain()
-        damped = Structure(plain.mass, plain.stiffness, plain.attachments, damping_ratio=ratio)
-        as_matrix = Structure(plain.mass, plain.stiffness, plain.attachments, damped.damping)
-        for mode, zeta in enumerate(np.broadcast_to(ratio, 2)):
-            for structure in (damped, as_matrix):
-                assert np.allclose(modal_curve(structure, small, mode).damping, zeta, rtol=1e-9)
-        more = modal_curve(damped, [1.0]).damping - modal_curve(plain, [1.0]).damping
-        slower = modal_curve(plain, small[:1]).frequency / modal_curve(plain, [1.0]).frequency
-        assert np.allclose(more, np.ravel(ratio)[0] * slower)
+        for ratio in (0.02, [0.01, 0.03]):
+            damped = Structure(plain.mass, plain.stiffness, plain.attachments, damping_ratio=ratio)
+            as_matrix = Structure(plain.mass, plain.stiffness, plain.attachments, damped.damping)
+            for mode, zeta in enumerate(np.broadcast_to(ratio, 2)):
+                for structure in (damped, as_matrix):
+                    found = modal_curve(structure, small, mode).damping
+                    assert np.allclose(found, zeta, rtol=1e-9)
+        far = [1.0, 1.5]  # as many amplitudes, which share the program
+        more = modal_curve(damped, far).damping - modal_curve(plain, far).damping
+        slower = curve.frequency[0] / modal_curve(plain, far).frequency
+        assert np.allclose(more, 0.01 * slower)
 
     @pytest.mark.slow
     def test_they_have_derivatives_to_every_number(self):
@@ -340,27 +294,6 @@ class TestTransient:
         assert off < rough.error * np.max(np.abs(motion.displacement))
 
 
-class TestRingDown:
-    TIME = np.linspace(0.0, 30.0, 6001)
-
-    @pytest.mark.parametrize("method", ["turning-points", "hilbert"])
-    def test_a_linear_oscillator(self, method):
-        signal = np.exp(-2.0 * np.pi * 0.01 * self.TIME) * np.cos(2.0 * np.pi * self.TIME) + 0.3
-        found = dynamics.ring_down(self.TIME, signal, method=method)
-        inner = slice(found.time.size // 10, -found.time.size // 10)
-        assert np.allclose(found.frequency[inner], 1.0, rtol=2e-3)
-        assert np.allclose(found.damping[inner], 0.01, rtol=0.05)
-        envelope = np.exp(-2.0 * np.pi * 0.01 * found.time)
-        assert np.allclose(found.amplitude[inner], envelope[inner], rtol=0.02)
-
-    def test_damping_that_grows_with_amplitude(self):
-        """An amplitude of 1/(1 + c t) decreases by c A^2 per time, so zeta grows with A."""
-        size = 1.0 / (1.0 + 0.1 * self.TIME)
-        found = dynamics.ring_down(self.TIME, size * np.sin(2.0 * np.pi * self.TIME))
-        expected = 0.1 * found.amplitude / (2.0 * np.pi)
-        assert np.allclose(found.damping, expected, rtol=0.02)
-
-
 def many(diagonal):
     """Sparse diagonal matrix of 500 degrees of freedom, whose entry 7 is given."""
     return scipy.sparse.diags_array([*[1e5] * 7, diagonal, *[1e5] * 492])
@@ -397,6 +330,7 @@ REFUSED = {
     "to itself": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 0, 0)]), "attachm"),
     "stiffening": (lambda: Joint([1.0, 2.0], [1.0, 3.0]), "softening"),
     "falling": (lambda: Joint([2.0, 1.0], [1.0, 3.0]), "rising"),
+    "width": (lambda: Joint.of(PLANE, 1.2, width=0.0), "width = 0.0"),
     "beyond gross slip": (lambda: Joint.of(PLANE, 2.5), "force = 2.5.*gross slip"),
     "no force": (
         lambda: Joint.of(PLANE.replace({"load.control": "displacement", "load.amplitude": 1e-5})),

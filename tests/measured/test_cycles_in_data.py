@@ -84,8 +84,8 @@ def range_of(driver, amplitude=1.0):
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
-@pytest.mark.parametrize("points", [40, 200, 1000])
-@pytest.mark.parametrize("noise", [0.0, *NOISES])
+@pytest.mark.parametrize("points", [40, 200])
+@pytest.mark.parametrize("noise", [0.0, *NOISES[1:]])
 @pytest.mark.parametrize("depth", [0.0, 0.15])
 def test_planted_cycles_are_found_whatever_their_noise_and_back_slips(driver, points, noise, depth):
     drive = driven([1.0] * 4, points, tail=0.6)
@@ -107,15 +107,6 @@ def test_planted_cycles_are_found_whatever_their_noise_and_back_slips(driver, po
     np.testing.assert_allclose(area(loop), planted_area(driver), rtol=0.01 + 2.0 * noise)
 
 
-@pytest.mark.parametrize("driver", DRIVERS)
-@pytest.mark.parametrize(
-    ("noise", "drive_noise"), [(n, p * n) for n in NOISES[1:] for p in (0, 0.3)]
-)
-def test_the_smoother_column_drives(driver, noise, drive_noise):
-    recording = recorded(driven([1.0] * 3, 200), driver, noise, 1, drive_noise)
-    assert find_driver(recording.force, recording.displacement) == driver
-
-
 @pytest.mark.parametrize("points", [40, 200])
 def test_the_column_that_repeats_its_levels_drives(points):
     # Steep moves back are small in the displacement that makes them, and large in the force.
@@ -125,13 +116,8 @@ def test_the_column_that_repeats_its_levels_drives(points):
     assert len(found.cycles) == 4
 
 
-def test_a_displacement_drives_what_slides_without_noise():
-    drive = driven([3.0] * 2, 200)
-    assert find_driver(answered(drive, "displacement") - 0.05 * drive, drive) == "displacement"
-
-
 @pytest.mark.parametrize("noisy", rig.NOISES)
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_noise_on_a_plateau_does_not_hide_that_the_displacement_drives(noisy, seed):
     random = np.random.default_rng(seed)
     u = 0.28 * rig.path(3, int(random.choice([80, 200])), shape=random.choice(["sine", "ramp"]))
@@ -145,7 +131,7 @@ def test_noise_on_a_plateau_does_not_hide_that_the_displacement_drives(noisy, se
 
 
 @pytest.mark.parametrize("noisy", rig.NOISES)
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_no_force_that_drives_shows_a_plateau(noisy, seed):
     random = np.random.default_rng(seed)
     force = rig.path(3, int(random.choice([40, 200])))
@@ -153,13 +139,6 @@ def test_no_force_that_drives_shows_a_plateau(noisy, seed):
     noise = random.choice([0.001, 0.01, 0.05])
     recording = rig.recorded(force, slid, noise, noisy, seed, random.choice([None, "force"]))
     assert not has_plateau(recording.force, recording.displacement)
-
-
-@pytest.mark.parametrize("driver", DRIVERS)
-def test_turns_of_a_path_without_noise_are_exact(driver):
-    drive = driven([1.0, 0.5, 1.0], 40)
-    levels = drive[find_turns(drive)]
-    np.testing.assert_array_equal(levels, [1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.0005])
@@ -173,18 +152,7 @@ def test_moves_back_by_less_than_a_tenth_are_no_turns(depth, turns, noise):
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
-def test_back_slips_are_no_part_of_the_mean(driver):
-    clean = driven([1.0] * 4, 200)
-    (loop,) = steady_loops(recorded(clean, driver), driver)
-    drive = np.insert(clean, np.full(21, 401), -0.09 * np.sin(np.linspace(0.0, np.pi, 21)))
-    (slipped,) = steady_loops(recorded(drive, driver), driver)
-    assert slipped.cycles == loop.cycles == 4
-    assert slipped.noise < 2e-3 * range_of(driver)
-    np.testing.assert_allclose(area(slipped), area(loop), rtol=1e-3)
-
-
-@pytest.mark.parametrize("driver", DRIVERS)
-@pytest.mark.parametrize("noise", [0.0, *NOISES[:2]])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_amplitudes_are_told_apart_and_averaged_each(driver, noise):
     amplitudes = (1.0, 0.3, 0.55)
     drive = driven([a for a in amplitudes for _ in range(4)] + [1.0] * 2, 200, tail=0.5)
@@ -201,8 +169,8 @@ def test_amplitudes_are_told_apart_and_averaged_each(driver, noise):
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
-@pytest.mark.parametrize("noise", [0.0, *NOISES])
-@pytest.mark.parametrize("start", [0.1, 0.37, 0.8])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("start", [0.1, 0.8])
 def test_one_cycle_that_starts_between_its_turns_is_rolled(driver, noise, start):
     whole = recorded(driven([1.0] * 3, 200), driver, noise, 8)
     own = slice(int((start + 1.25) * 200), int((start + 2.25) * 200) + 1)
@@ -230,7 +198,7 @@ def test_a_first_cycle_that_differs_is_left_out(driver):
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
-@pytest.mark.parametrize("points", [40, 200, 1000])
+@pytest.mark.parametrize("points", [40, 1000])
 @pytest.mark.parametrize("noise", NOISES)
 def test_the_noise_is_told(driver, points, noise):
     # From just after a turn to just before one.
@@ -244,7 +212,7 @@ def test_the_noise_is_told(driver, points, noise):
     np.testing.assert_allclose(loop.standard_error, loop.noise / np.sqrt(each), rtol=0.2)
 
 
-@pytest.mark.parametrize(("points", "cycles"), [(40, 6), (96, 3), (400, 4)])
+@pytest.mark.parametrize(("points", "cycles"), [(40, 6), (96, 3)])
 def test_mean_loops_scatter_by_their_standard_error(points, cycles):
     drive, noise = driven([1.0] * cycles, points), 0.01
     clean = recorded(drive, "force")
@@ -273,7 +241,7 @@ def test_mean_loops_scatter_by_their_standard_error(points, cycles):
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
-@pytest.mark.parametrize("noise", [0.0, *NOISES[:2]])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
 @pytest.mark.parametrize("drift", ["linear", "cycle"])
 @pytest.mark.parametrize("drifts", [(0.5, 0.0), (-0.3, 0.08)])
 def test_a_drift_is_removed_and_told(driver, noise, drift, drifts):
@@ -310,7 +278,7 @@ def test_a_drift_that_is_kept_is_told():
 PULL = driven([1.0] * 2, 200)
 
 
-@pytest.mark.parametrize("noise", [0.0, *NOISES])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
 @pytest.mark.parametrize(
     ("drive", "told"),
     [
@@ -334,22 +302,19 @@ def test_recordings_without_a_whole_cycle_say_so(drive, told, noise):
         steady_loops(recorded(drive, "force", noise, 6, 0.3 * noise), "force")
 
 
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        ({"driver": "load"}, "driver = 'load': give 'force' or 'displacement'"),
-        ({"drift": "linaer"}, r"drift = 'linaer': choose among \('keep', 'linear', 'cycle'\)"),
-        ({"smallest": 0.0}, "smallest = 0.0: give a share of the range between 0 and 1"),
-        ({"steady": -1.0}, "steady = -1.0: give a part of the range, such as 0.01"),
-        ({"points": 16}, "points = 16: give more than 16"),
-    ],
-)
-def test_bad_options_are_refused(options, told):
-    with pytest.raises(InputError, match=told):
-        steady_loops(recorded(PULL, "force"), **options)
+OPTIONS = [
+    ({"driver": "load"}, "driver = 'load': give 'force' or 'displacement'"),
+    ({"drift": "linaer"}, r"drift = 'linaer': choose among \('keep', 'linear', 'cycle'\)"),
+    ({"smallest": 0.0}, "smallest = 0.0: give a share of the range between 0 and 1"),
+    ({"steady": -1.0}, "steady = -1.0: give a part of the range, such as 0.01"),
+    ({"points": 16}, "points = 16: give more than 16"),
+]
 
 
-def test_a_loop_built_by_hand_is_checked():
+def test_bad_options_and_loops_built_by_hand_are_refused():
+    for options, told in OPTIONS:
+        with pytest.raises(InputError, match=told):
+            steady_loops(recorded(PULL, "force"), **options)
     flat = Loop(np.zeros(20), np.linspace(0.0, 1.0, 20), label="rig")
     with pytest.raises(InputError, match=r"rig: force is constant \(0\): no loop to fit"):
         steady_loops(flat)
@@ -451,7 +416,7 @@ def test_drift_goes_on_beyond_the_cycles_as_it_was_at_each_end():
 @pytest.mark.parametrize("name", ["jenkins", "bouc-wen", "iwan by force"])
 def test_the_column_that_moves_as_a_machine_drives(name):
     random = np.random.default_rng(7)
-    for seed in range(40):
+    for seed in range(20):
         noise = random.choice([0.0, 0.002, 0.01])
         columns = rig.sound(name, random)
         noisy = random.choice(list(rig.NOISES))

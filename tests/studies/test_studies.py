@@ -69,8 +69,12 @@ def test_every_study_says_in_a_line_what_it_does():
     for name, (_, line) in FOUND.items():
         assert line.endswith("."), name
     assert len(FOUND) > 20
+    for name in RECORDED:  # which belongs to the code of today
+        assert running.read(STUDIES[name].with_suffix(".json"))
+        running.load(STUDIES[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDED)
 def test_a_record_is_told_and_drawn(name):
     study = running.load(STUDIES[name])
@@ -83,7 +87,8 @@ def test_a_record_is_told_and_drawn(name):
         assert all(figure.axes for figure in several)
 
 
-def test_a_list_a_run_and_a_picture(toys, tmp_path, capsys):
+@pytest.mark.slow
+def test_a_list_a_run_a_picture_and_parts(toys, tmp_path, capsys):
     assert toys() == 0
     assert capsys.readouterr().out.splitlines() == ["parts  A toy in parts.", "whole  A toy."]
     assert toys("whole", "count=3") == 0
@@ -94,9 +99,6 @@ def test_a_list_a_run_and_a_picture(toys, tmp_path, capsys):
     (tmp_path / "toys" / "whole.png").unlink()
     assert toys("whole", "--draw") == 0
     assert (tmp_path / "toys" / "whole.png").exists()
-
-
-def test_parts_are_renewed_alone_or_where_they_are_missing(toys, tmp_path):
     path = tmp_path / "toys" / "parts.json"
     assert toys("parts", "--only", "b") == 0
     assert json.loads(path.read_text("utf-8"))["b"] == {"value": 1}
@@ -104,9 +106,7 @@ def test_parts_are_renewed_alone_or_where_they_are_missing(toys, tmp_path):
     record = json.loads(path.read_text("utf-8"))
     assert (record["a"], record["b"]) == ({"value": 2}, {"value": 1})
     assert set(record["about"]) == {"a", "b"}
-
-
-def test_what_there_is_not_is_refused(toys, capsys):
+    capsys.readouterr()
     with pytest.raises(SystemExit):
         toys("nothing")
     assert "there is parts, whole" in capsys.readouterr().err
@@ -116,6 +116,7 @@ def test_what_there_is_not_is_refused(toys, capsys):
     assert "choose of a, b" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_map_of_a_section_shows_all_cells():
     record = running.read(STUDIES["verification/sections"].with_suffix(".json"))
     with pytest.raises(jb.InputError):
@@ -126,6 +127,7 @@ def test_a_map_of_a_section_shows_all_cells():
     np.testing.assert_allclose(sorted(drawn), off, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_readme_takes_a_loop_to_a_fitted_joint(tmp_path, monkeypatch, capsys):
     folder = ROOT / "calibration"
     text = (folder / "README.md").read_text("utf-8")

@@ -1,10 +1,9 @@
 """Results of a sweep as others read them: a set of arrays, its files, pictures; interruptions."""
 
-import itertools
-
 import numpy as np
 import pytest
 import xarray
+from small import FIGURES, MANY, SCENE
 from toy import STRIP
 
 import jbeamshell as jb
@@ -95,79 +94,36 @@ def test_a_map_marks_the_lanes_not_to_rely_on():
         plotting.sweep_contour(made_up(paired=True))
 
 
-def label_boxes(axis):
-    """Boxes of an axis's labels that are seen, along the axis."""
-    axis.figure.draw_without_rendering()
-    labels = [*axis.get_ticklabels(), *axis.get_ticklabels(minor=True)]
-    low, high = sorted(axis.get_view_interval())
-    places = [*axis.get_ticklocs(), *axis.get_ticklocs(minor=True)]
-    seen = [
-        label.get_window_extent()
-        for label, place in zip(labels, places, strict=True)
-        if label.get_text() and low <= place <= high
-    ]
-    return sorted(seen, key=lambda box: (box.x0, box.y0))
-
-
-@pytest.mark.parametrize(
-    "amplitudes", [np.linspace(0.05, 1.5, 6), np.geomspace(0.05, 1.6, 6), np.array([0.05, 1.5])]
-)
-def test_labels_of_a_map_with_logarithmic_axes_do_not_touch_and_its_cells_are_whole(amplitudes):
-    over = {"load.amplitude": amplitudes, "strip.height_ratio": np.array([0.01, 0.05, 0.3])}
-    scene = jb.Scene().replace({"model.section": "squeeze", "model.nodes": 9, "load.cycles": 1})
-    axes = plotting.sweep_contour(
-        jb.sweep(scene, over, ["secant_stiffness"]), figure="secant_stiffness"
-    )
-    assert axes.get_xscale() == axes.get_yscale() == "log"
-    bar = axes.figure.axes[1]
-    for axis in (axes.xaxis, axes.yaxis, bar.yaxis):
-        boxes = label_boxes(axis)
-        assert len(boxes) >= 2
-        for one, other in itertools.combinations(boxes, 2):
-            assert not one.overlaps(other)
-    left, right = axes.get_xlim()
-    assert left < amplitudes[0] < amplitudes[-1] < right
-
-
 # --- interrupted ----------------------------------------------------------------------------------
-
-TINY = {
-    "model.nodes": 9,
-    "model.kinematics": "linear",
-    "load.steps_per_half_cycle": 2,
-    "load.cycles": 1,
-}
-SCENE = STRIP.replace(TINY)
-OVER = {"load.amplitude": np.linspace(0.2, 2.2, 12), "strip.height_ratio": [0.05, 0.1, 0.2, 0.4]}
 
 
 def cut(done, total):
-    if done >= 32:
+    if done >= 40:
         raise KeyboardInterrupt
 
 
 def test_what_is_interrupted_in_a_notebook_is_returned(monkeypatch):
-    whole = jb.sweep(SCENE, OVER, ["dissipation"])
+    whole = jb.sweep(SCENE, MANY, FIGURES)
     with pytest.raises(KeyboardInterrupt, match="interrupted; nothing is kept: give out="):
-        jb.sweep(SCENE, OVER, ["dissipation"], progress=cut)
+        jb.sweep(SCENE, MANY, FIGURES, progress=cut)
     monkeypatch.setattr(run, "in_notebook", lambda: True)
-    with pytest.warns(UserWarning, match="sweep interrupted after 32 of 40 lanes"):
-        part = jb.sweep(SCENE, OVER, ["dissipation"], progress=cut)
+    with pytest.warns(UserWarning, match="sweep interrupted after 40 of 96 lanes"):
+        part = jb.sweep(SCENE, MANY, FIGURES, progress=cut)
     ran = part["status"].values != Outcome.NOT_RUN
-    assert np.sum(~ran) == 8
+    assert np.sum(~ran) == 56
     for name in ("status", "dissipation"):
         np.testing.assert_array_equal(part[name].values[ran], whole[name].values[ran])
     assert np.all(np.isnan(part["dissipation"].values[~ran]))
     assert np.all(part["doubtful"].values[~ran])
-    assert "interrupted after 32 of 40 lanes; the others are not_run" in part.notes
+    assert "interrupted after 40 of 96 lanes; the others are not_run" in part.notes
     with pytest.raises(KeyboardInterrupt):
-        jb.sweep(SCENE, OVER, ["dissipation"], progress=lambda *_: cut(99, 99))
+        jb.sweep(SCENE, MANY, FIGURES, progress=lambda *_: cut(99, 99))
 
 
 def test_progress_is_shown_where_a_person_watches(monkeypatch, capsys):
     monkeypatch.setattr(progress, "DELAY", 0.0)
-    jb.sweep(SCENE, OVER, ["dissipation"])
+    jb.sweep(SCENE, MANY, FIGURES)
     assert capsys.readouterr().err == ""
     monkeypatch.setattr(progress, "watched", lambda: True)
-    jb.sweep(SCENE, OVER, ["dissipation"])
-    assert "0/40" in capsys.readouterr().err
+    jb.sweep(SCENE, MANY, FIGURES)
+    assert "0/96" in capsys.readouterr().err
