@@ -21,9 +21,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
 from jbeamshell.common.threads import on_one_core
-from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.plan import Plan, planned
+from jbeamshell.identify.plan import Options, Plan, planned
 from jbeamshell.identify.results import Fit
 
 LEVEL = 0.95  # part of the values between the ends that a summary names

@@ -43,9 +43,8 @@ from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
 from jbeamshell.identify.assembly import Assembly
-from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.plan import Plan, planned
+from jbeamshell.identify.plan import Options, Plan, planned
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import law_named
 from jbeamshell.scene import library

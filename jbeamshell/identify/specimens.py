@@ -1,4 +1,4 @@
-"""Specimens of a fit: a strip, a joint or a structure, and what was measured on it."""
+"""Specimens of a fit, as users say them, and the cases that come of them with whole models."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,25 @@ WRONG_DRIVE = (
 QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
 OF_SHEAR = ("strip.kappa_s", "strip.poisson_ratio", "strip.curvature")
 ZEROS = {"rig.force_zero", "rig.displacement_zero"}
+
+
+class Case(NamedTuple):
+    """Whole model of one specimen, and its measurements as they are compared.
+
+    Attributes
+    ----------
+    model : strip, law or structure
+    measurements : what was measured
+    weights : (measurements,) factors of the residuals, besides the curves' own
+    rig : values of the rig by dotted key; those that are not named are 0
+    label : name in messages and in the names of the specimen's own values
+    """
+
+    model: Model
+    measurements: Sequence[Any]
+    weights: NDArray[np.float64]
+    rig: Mapping[str, Any] = {}
+    label: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,11 +132,6 @@ class Specimen:
         check_rig(self.rig)
 
     @property
-    def model(self) -> Model:
-        """Model of a scene, a law or a structure that is whole."""
-        return as_model(self.scene)
-
-    @property
     def rig(self) -> dict[str, Any]:
         """Values of the rig by dotted key; those that are not named are 0."""
         return {key: value for key, value in self.set.items() if key.startswith(PREFIX)}
@@ -133,9 +147,12 @@ class Specimen:
         one = isinstance(self.data, str) or not isinstance(self.data, Sequence)
         return [self.data] if one else list(self.data)
 
-    def checked_weights(self) -> NDArray[np.float64]:
-        """Weights (measurements,); raises `InputError` unless there are none or one for each."""
-        count, where = len(self.measurements), f" of {self.label!r}" if self.label else ""
+    def case(self, model: Any, data: Sequence[Any]) -> Case:
+        """Case of the specimen with a whole model and data as they are compared.
+
+        Raises `InputError` unless there are no weights or one for each measurement.
+        """
+        count, where = len(data), f" of {self.label!r}" if self.label else ""
         fix = f"give one positive number for each of the {count} measurements"
         several = isinstance(self.weights, list | tuple | np.ndarray)
         require(f"weights{where}", self.weights, several, fix)
@@ -143,7 +160,7 @@ class Specimen:
         weights = given if given.size else np.ones(count)
         if weights.shape != (count,) or not np.all(np.isfinite(weights) & (weights > 0.0)):
             raise InputError(f"weights{where} = {given.tolist()}: {fix}")
-        return weights
+        return Case(as_model(model), data, weights, self.rig, self.label)
 
     def known(self, folder: Path) -> Dimensions:
         """Dimensions of the specimen in SI; a file is looked for in a folder."""

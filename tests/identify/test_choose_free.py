@@ -112,7 +112,7 @@ def test_a_contact_that_slides_forgets_its_zero(tmp_path, centre, middle):
     (tmp_path / "rig.csv").write_text("\n".join(["force [N],displacement [m]", *rows]))
     specimen = {"data": ["rig.csv"]} | ({} if centre is None else {"centre": centre})
     plan = plan_from_values({"specimen": [specimen]}, tmp_path)
-    (taken,) = plan.specimens[0].measurements
+    (taken,) = plan.cases[0].measurements
     found = 0.5 * (np.max(taken.displacement) + np.min(taken.displacement))
     assert found == pytest.approx(middle, abs=1e-9)
 

@@ -11,7 +11,6 @@ import jbeamshell as jb
 from jbeamshell import identify
 from jbeamshell.identify import models, rig
 from jbeamshell.identify.models import as_model
-from jbeamshell.identify.observations import observe
 from jbeamshell.identify.parameters import RIG
 from jbeamshell.identify.plan import planned
 from jbeamshell.identify.specimens import Specimen
@@ -78,7 +77,7 @@ def behind(amplitude, **values):
 
 def seen_by(loop, scene=SCENE, **values):
     given = {f"rig.{name}": value for name, value in values.items()}
-    return rig.rigged(loop, observe(loop, scene), as_model(scene), given, [])
+    return rig.observed(loop, as_model(scene), given)
 
 
 @pytest.mark.parametrize("compliance", [0.1, 1.0, 30.0])
@@ -143,8 +142,8 @@ def test_a_planted_rig_is_found(slid):
 def test_a_plan_holds_and_frees_values_of_the_rig(slid):
     loop, _ = behind(1.0, compliance=1.0)
     plan = planned(Specimen({"model.nodes": 7}, [loop], set={COMPLIANCE: 1.0}), free=["rig.drift"])
-    assert plan.specimens[0].rig == {COMPLIANCE: 1.0}
-    (drift,) = rig.with_starts(plan.free, plan.specimens)
+    assert plan.cases[0].rig == {COMPLIANCE: 1.0}
+    (drift,) = rig.with_starts(plan.free, plan.cases)
     assert (drift.start, drift.high) == (0.0, np.ptp(loop.force))
 
 

@@ -119,7 +119,7 @@ def test_a_number_of_a_structure_may_be_negative_and_stand_in_a_list():
         found = fit(data, start, [chi, "structure.k"], starts=1)
         assert found.values["structure.chi"] == pytest.approx(-0.3, rel=1e-6)
         assert found.values["structure.k"] == pytest.approx(20.0, rel=1e-6)
-    assert Parameter("structure.k").bijection(25.0).log  # a positive one stays positive
+    assert Parameter("structure.k").coordinate(25.0).log  # a positive one stays positive
 
 
 def test_a_builder_that_jax_cannot_trace_is_told_so():
@@ -211,10 +211,10 @@ def test_a_plan_names_the_structure(tmp_path):
         "specimen": [{"data": ["d.csv"], "kind": "damping"}],
     }
     plan = plan_from_values(values, tmp_path)
-    (specimen,) = plan.specimens
-    assert float(specimen.scene.get("structure.damping_ratio")) == 0.01
-    assert specimen.scene.point == 0
-    assert specimen.measurements[0].amplitude.tolist() == [1e-6, 2e-6, 3e-6]
+    (case,) = plan.cases
+    assert float(case.model.get("structure.damping_ratio")) == 0.01
+    assert case.model.point == 0
+    assert case.measurements[0].amplitude.tolist() == [1e-6, 2e-6, 3e-6]
     with pytest.raises(jb.InputError, match="structure: 'masses' is unknown"):
         plan_from_values(values | {"structure": {"masses": 1.0}}, tmp_path)
     with pytest.raises(jb.InputError, match="free"):
