@@ -11,11 +11,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import numpy as np
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.jax_options import ONCE
 from jbeamshell.identify.choose_free import chosen_free
 from jbeamshell.identify.models import LawModel, Model, StripModel
 from jbeamshell.identify.parameters import RIG, Parameter, as_parameters
@@ -251,5 +253,12 @@ def _told(law: Law, data: Sequence[Measurement], keys: Sequence[str]) -> list[st
         return list(keys)
     way = np.concatenate([item.displacement for item in data if isinstance(item, Backbone)])
     numbers = {key: law.get(key) for key in keys}
-    slopes = jax.jacfwd(lambda values: law.replace(values).backbone(way))(numbers)
+    slopes = _slopes(law, numbers, way)
     return [key for key in keys if np.any(np.asarray(slopes[key]) != 0.0)]
+
+
+@eqx.filter_jit(compiler_options=ONCE)
+def _slopes(law: Law, numbers: dict[str, Any], way: Any) -> dict[str, Any]:
+    """Derivatives of a law's backbone by numbers of dotted keys."""
+    slopes: dict[str, Any] = jax.jacfwd(lambda own: law.replace(own).backbone(way))(numbers)
+    return slopes

@@ -66,7 +66,7 @@ def test_what_is_given_is_not_fitted():
 
 def test_beside_youngs_modulus_friction_and_height_are_one_number():
     """In units of A/E' nothing but A/(mu F_N H) is left, so that loops tell one of the two."""
-    scene = jb.Scene().replace({MODULUS: 2e5})
+    scene = jb.Scene().replace({MODULUS: 2e5, "model.section": "plane", "model.nodes": 33})
     ask = jb.response(scene, [MU, ETA], ["dissipation", "peak_displacement"])
     one, other = ask(0.1, 0.1), ask(0.2, 0.05)
     for name in ("dissipation", "peak_displacement"):

@@ -65,7 +65,7 @@ def test_work_and_displacement_of_finite_elements_lie_on_one_curve():
             assert found.displacement == pytest.approx(bar * _beyond_bar(x), rel=0.15)
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(12))
 def test_no_start_is_beyond_gross_slip_whatever_is_known(seed):
     loops, known, truth = random_specimen(seed, 0.01)
     plan = planned(loops, known, [MU])
