@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require, shown
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml
 from jbeamshell.identify.models import Model, StripModel, as_model
@@ -112,22 +112,15 @@ class Specimen:
     dimensions: Mapping[str, Any] | str = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        words = {
-            "kind": tuple(KINDS),
-            "cycles": CYCLES,
-            "drift": DRIFTS,
-            "driver": (None, *CONTROLS),
-        }
-        words["reverse"] = (None, *QUANTITIES)
+        drives = {"driver": (None, *CONTROLS), "reverse": (None, *QUANTITIES)}
+        words = {"kind": tuple(KINDS), "cycles": CYCLES, "drift": DRIFTS, **drives}
         for name, known in words.items():
             value = getattr(self, name)
-            if not (value is None or isinstance(value, str)) or value not in known:
-                names = ", ".join(repr(word) for word in known if word)
-                raise InputError(f"{name} = {shown(value)}: choose among {names}")
-        if self.centre not in (None, True, False):
-            raise InputError(f"centre = {self.centre!r}: give true or false")
-        if not (is_number(self.width) and self.width > 0.0):
-            raise InputError(f"width = {shown(self.width)}: give a positive number")
+            valid = (value is None or isinstance(value, str)) and value in known
+            require(name, value, valid, f"choose among {', '.join(repr(w) for w in known if w)}")
+        require("centre", self.centre, self.centre in (None, True, False), "give true or false")
+        positive = is_number(self.width) and self.width > 0.0
+        require("width", self.width, positive, "give a positive number")
         require("set", self.set, isinstance(self.set, Mapping), "give values by dotted key")
         check_rig(self.rig)
 
