@@ -11,7 +11,6 @@ import os
 import shutil
 import sys
 import tempfile
-import types
 import warnings
 from pathlib import Path
 
@@ -23,8 +22,8 @@ import scipy.sparse
 import jbeamshell as jb
 from jbeamshell.bodies.matrix_files import read_matrix
 from jbeamshell.dynamics.export import table
-from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.plan_file import read_plan
+from jbeamshell.identify.runs import Evaluation
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.loop_files import read_loops
@@ -107,9 +106,7 @@ def _stores(folder):
 
 def saved_runs(path, **settings):
     """State of a fit of two numbers."""
-    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
-    space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
-    return SavedRuns(path, experiment, space, Newton(**settings))
+    return SavedRuns(path, (("a", "b"), Newton(**settings)), ())
 
 
 def _bodies(folder):
@@ -206,7 +203,7 @@ def _history(path):
 
 
 def _plan(path):
-    loops = [loop for specimen in read_plan(path).specimens for loop in specimen.data]
+    loops = [loop for case in read_plan(path).cases for loop in case.measurements]
     return [column for loop in loops for column in (loop.force, loop.displacement)]
 
 

@@ -37,8 +37,6 @@ ROOT = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
 HOMES = {
     "diffrax": "dynamics/",
     "matplotlib": "plotting/",
-    "jaxopt": "identify/search.py",
-    "optax": "identify/search.py",
     "pint": "measured/columns.py",
     "distributed": "cli/sweep.py",
     "panel": "explorer/",

@@ -11,7 +11,7 @@ import pytest
 import jbeamshell as jb
 
 STUB = Path(jb.__file__).with_suffix(".pyi")
-HEAVY = {"jax", "numpy", "matplotlib", "diffrax", "optax", "jaxopt", "pint", "scipy", "xarray"}
+HEAVY = {"jax", "numpy", "matplotlib", "diffrax", "pint", "scipy", "xarray"}
 
 
 def promised():

@@ -6,16 +6,20 @@ beta follow from the curves of displacement and dissipation, without a test.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require, require_number
+from jbeamshell.common.jax_options import ONCE
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.laws.iwan4 import Iwan4
-from jbeamshell.laws.iwan4_fit import exponents, iwan4_through
 from jbeamshell.laws.law import Law
 from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.scene import Scene
@@ -25,6 +29,9 @@ FRACTIONS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # of gros
 LITTLE = 0.01  # of gross slip, at which the contact is taken to stick
 LEAST = 1e-9  # energy of a cycle that is felt, over F u
 ENOUGH = 4  # amplitudes
+LOWEST_CHI = -0.99  # at -1 all sliders slip at once
+STARTS = [(chi, beta) for chi in (-0.9, -0.5, -0.1) for beta in (0.05, 1.0)]
+SIDES = 12.0  # of the logarithms that are found, from their starts
 
 
 class FourParameters(Tree):
@@ -57,7 +64,7 @@ class FourParameters(Tree):
     @property
     def exponents(self) -> NDArray[np.float64]:
         """Exponents (k,) of the power laws D ~ F^n that touch the dissipation."""
-        return exponents(self.force, self.dissipation)
+        return np.gradient(np.log(self.dissipation), np.log(self.force))
 
     def __str__(self) -> str:
         law, n = self.law, self.exponents
@@ -85,8 +92,8 @@ def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters
     Raises
     ------
     InputError
-        for a scene or law without gross slip, a scene that is driven otherwise than by a force, or
-        a joint that ends below .3 of gross slip
+        for a scene or law without gross slip or of infinite stiffness, a scene that is driven
+        otherwise than by a force, or a joint that ends below .3 of gross slip
     UnconvergedError
         if a load step has no equilibrium
 
@@ -99,8 +106,7 @@ def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters
     mounting = getattr(scene, "mounting", "") if isinstance(scene, Law) else in_words(scene)
     limit, stiffest, force, u, loss = found
     f, d = width * force, width * loss
-    law = iwan4_through(width * limit, width * stiffest, f, u, d)
-    return FourParameters(law, f, u, d, mounting)
+    return FourParameters(_nearest(width * limit, width * stiffest, f, u, d), f, u, d, mounting)
 
 
 def _of_scene(scene: Scene) -> tuple[Any, ...]:
@@ -135,3 +141,51 @@ def _of_law(law: Law) -> tuple[Any, ...]:
     require(f"{law.heading}.forces", top, f.size >= ENOUGH, fix)
     u = np.asarray(law.displacement(f))
     return capacity, float(law.stiffness), f, u, np.asarray(law.dissipation(u))
+
+
+def _nearest(limit: float, stiffest: float, *curves: NDArray[np.float64]) -> Iwan4:
+    """Four-parameter model nearest to curves (k,) of force, displacement and dissipation.
+
+    The squares of the relative errors of dissipation and displacement, both at one force, are
+    least in sum: sum_i ln(D/D_i)^2 + ln(U/U_i)^2.  F_S is the gross slip of the curves, and K_T
+    at most their largest stiffness.
+    """
+    softest = float(np.max(curves[0] / curves[1]))
+    fix = f"must be a number, {softest:.6g} or more, the secant stiffness of the curves"
+    require("stiffest", stiffest, softest <= stiffest < np.inf, fix)
+    from scipy.optimize import least_squares  # slow to import
+
+    given = limit, *map(jnp.asarray, curves)
+    start, low = np.log(softest) - 1e-3, [np.log(softest) - SIDES, LOWEST_CHI, -SIDES]
+    found = min(
+        (
+            least_squares(
+                lambda x: np.asarray(_errors(x, *given)[0]),
+                [start, chi, np.log(beta)],
+                lambda x: np.asarray(_errors(x, *given)[1]),
+                (low, [np.log(stiffest), 0.0, SIDES]),
+            )
+            for chi, beta in STARTS
+        ),
+        key=lambda fit: float(fit.cost),
+    )
+    return _law_at(found.x, limit)
+
+
+def _law_at(x: Any, limit: Any) -> Iwan4:
+    """Model with the logarithm of K_T, chi, and the logarithm of beta."""
+    return Iwan4(slip_force=limit, stiffness=jnp.exp(x[0]), chi=x[1], beta=jnp.exp(x[2]))
+
+
+@partial(jax.jit, compiler_options=ONCE)
+def _errors(x: Array, limit: Array, f: Array, u: Array, d: Array) -> tuple[Array, Array]:
+    """Logarithms (2k,) of dissipation and displacement over the given ones, and their slopes."""
+
+    def errors(x: Array) -> tuple[Array, Array]:
+        law = _law_at(x, limit)
+        reached = law.displacement(f)
+        off = jnp.concatenate([jnp.log(law.dissipation(reached) / d), jnp.log(reached / u)])
+        return off, off
+
+    slopes, off = jax.jacfwd(errors, has_aux=True)(x)
+    return off, slopes

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
+from jbeamshell.identify.parameters import Parameter, as_parameters
 from jbeamshell.identify.starts import HEIGHT, STIFFNESS, Estimate, suits
 from jbeamshell.measured.curves import SqueezeCurve
 from jbeamshell.scene.scene import Scene
@@ -24,8 +25,8 @@ STIFF, MODULUS = STIFFNESS
 
 def chosen_free(
     scene: Scene | None, known: Mapping[str, Any], data: Sequence[Any], found: Estimate | None
-) -> dict[str, str]:
-    """Keys to fit, each with the reason why these data tell it.
+) -> tuple[tuple[Parameter, ...], str]:
+    """Parameters to fit, and a sentence on why these data tell them.
 
     Parameters
     ----------
@@ -46,12 +47,12 @@ def chosen_free(
         and not (scene is not None and scene.get(key) is None)
     }
     free = {k: reason for k, reason in reasons.items() if other_names.get(k, k) not in given}
-    if free:
-        return free
-    # All that the data tell is given: these values are starts.
-    return {key: f"{reason}; it is given and starts there" for key, reason in reasons.items()} or {
-        FRICTION: "the data tell nothing that the layers leave open"
-    }
+    if not free:  # all that the data tell is given: these values are starts
+        free = {k: f"{reason}; it is given and starts there" for k, reason in reasons.items()}
+    free = free or {FRICTION: "the data tell nothing that the layers leave open"}
+    told = "; ".join(f"{key} ({reason})" for key, reason in free.items())
+    note = f"Fitted: {told}; choose with free= (--free on the command line)"
+    return as_parameters(list(free)), note
 
 
 def _told(

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.identify.models import LawModel, Model, as_model
-from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.observations import Observation, observe
-from jbeamshell.identify.plan import Datum, planned
+from jbeamshell.identify.plan import Datum, Options, planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law, law_named

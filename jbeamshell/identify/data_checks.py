@@ -6,14 +6,13 @@ Loops that show otherwise are told as doubts, as no numbers of the law can follo
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from jbeamshell.identify.models import LawModel, Model
-from jbeamshell.identify.specimens import Specimen, plausible_stiffness
+from jbeamshell.identify.specimens import Case, plausible_stiffness
 from jbeamshell.laws import MasingLaw
 from jbeamshell.measured.closed_curve import PARTS
 from jbeamshell.measured.form import FEWEST_POINTS, Measurement
@@ -26,14 +25,12 @@ SURE = 2.0  # standard errors by which noise may make them differ
 DISSIPATES = 1e-3  # work over that of the rectangle about a loop, below which the loop is a line
 
 
-def inspected(
-    specimens: Sequence[Specimen], free: Sequence[str], unchecked: bool = False
-) -> list[str]:
-    """Doubts about the specimens' loops, see `jbeamshell.inspect`.
+def inspected(cases: Sequence[Case], free: Sequence[str], unchecked: bool = False) -> list[str]:
+    """Doubts about the loops of cases, see `jbeamshell.inspect`.
 
     Parameters
     ----------
-    specimens : strips and what was measured on them
+    cases : models and what was measured
     free : keys to fit, which say nothing of the loops yet
     unchecked : True to tell grave findings as doubts
 
@@ -43,14 +40,13 @@ def inspected(
         for a grave finding, such as negative work
     """
     doubts = []
-    for specimen in specimens:
-        loops = [item for item in specimen.measurements if isinstance(item, Loop)]
+    for case in cases:
+        loops = [item for item in case.measurements if isinstance(item, Loop)]
         if loops:
-            band = plausible_stiffness(specimen.model, [*free, *specimen.rig])
-            seen = inspect(loops, stiffness=band)
+            seen = inspect(loops, stiffness=plausible_stiffness(case.model, [*free, *case.rig]))
             if not unchecked:
                 seen.check()
-            doubts += [*seen.doubts(), *feature_doubts(specimen.model, seen.views)]
+            doubts += [*seen.doubts(), *feature_doubts(case.model, seen.views)]
     return doubts
 
 
@@ -77,21 +73,21 @@ def feature_doubts(model: Model, views: Sequence[View]) -> list[str]:
     return doubts
 
 
-def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[str]]:
-    """Specimens without copies among their measurements, and a sentence on each copy.
+def counted_once(cases: Sequence[Case]) -> tuple[list[Case], list[str]]:
+    """Cases without copies among their measurements, and a sentence on each copy.
 
     A copy holds the points of another measurement, all or some of them, or the columns of another
     loop times factors of other units.  A loop that repeats one cycle point by point keeps one.  A
     copy of a measurement of another specimen stays, as that may be what its own numbers rest on.
     """
-    kept: list[Specimen] = []
+    kept: list[Case] = []
     said: list[str] = []
     others: list[Any] = []
-    for specimen in specimens:
-        if not all(isinstance(item, Measurement) for item in specimen.measurements):
-            kept.append(specimen)  # no measurement, which the fit refuses
+    for case in cases:
+        if not all(isinstance(item, Measurement) for item in case.measurements):
+            kept.append(case)  # no measurement, which the fit refuses
             continue
-        single = [_one_cycle(item) for item in specimen.measurements]
+        single = [_one_cycle(item) for item in case.measurements]
         for item, repeats in single:
             if repeats > 1:
                 said.append(
@@ -99,7 +95,6 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
                     "once"
                 )
         own = [item for item, _ in single]
-        weights = specimen.checked_weights()
         fullest = sorted(range(len(own)), key=lambda place: -own[place].columns[0].size)
         places: list[int] = []
         for place in fullest:
@@ -111,16 +106,13 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
         for item, other in ((own[i], other) for i in places for other in others):
             if told := _copy(item, other) or _copy(other, item):
                 said.append(
-                    f"{item.label} of {specimen.label} and {other.label} of another specimen are "
+                    f"{item.label} of {case.label} and {other.label} of another specimen are "
                     f"copies ({told}): errors of numbers that both share are too small"
                 )
         others += own
         chosen = sorted(places)
-        kept.append(
-            dataclasses.replace(
-                specimen, data=[own[i] for i in chosen], weights=weights[chosen].tolist()
-            )
-        )
+        data, weights = [own[i] for i in chosen], case.weights[chosen]
+        kept.append(case._replace(measurements=data, weights=weights))
     return kept, said
 
 

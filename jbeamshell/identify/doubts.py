@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.dynamics.structure.modal import DOUBTED
-from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import LawModel, Model
 from jbeamshell.identify.observations import ModalObservation
-from jbeamshell.identify.parameters import Bijection
+from jbeamshell.identify.parameters import Coordinate
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.starts import FRICTIONS, STIFFNESS
@@ -64,11 +63,11 @@ def doubts_of(
     left : misfit of each measurement that is no white noise
     minima : cost at the end of each search, the best first
     """
-    space, experiment, rows = uncertainty.space, problem.experiment, problem.experiment.weight.size
-    values, best = space.values(uncertainty.point).tolist(), problem(uncertainty.point)
+    space, rows, point = problem.space, problem.weight.size, uncertainty.point
+    values, best = space.values(point).tolist(), problem(point)
     doubts = [
-        *undescribed(experiment, left, best.prediction),
-        *_contradictions(problem, uncertainty.point),
+        *undescribed(problem, left, best.prediction),
+        *_contradictions(problem, point),
         *doubt_of_units(space, values),
     ]
     for model in models:
@@ -80,15 +79,14 @@ def doubts_of(
                 f"{float(law.backbone(far)):.4g}"
             )
     if best.converged:
-        doubts += _of_statics(experiment, models, uncertainty, best.jacobian)
-    for name, bijection, value in zip(space.names, space.bijections, values, strict=True):
-        bound = bijection.bound_at(value)
+        doubts += _of_statics(problem, models, uncertainty, best.jacobian)
+    for name, bound, value in zip(space.names, space.bounds_at(point), values, strict=True):
         if bound is not None:
             doubts.append(
                 f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and the "
                 "errors of the others take it as fixed"
             )
-    if experiment.noisy and uncertainty.scatter > WRONG_MODEL:
+    if problem.noisy and uncertainty.scatter > WRONG_MODEL:
         doubts.append(
             f"the model leaves {uncertainty.scatter:.2g} times the measured noise "
             "unexplained: it is wrong in some way, and the errors include what it leaves"
@@ -107,31 +105,30 @@ def doubts_of(
     return doubts + uncertainty.limitations()
 
 
-def undescribed(experiment: Experiment, left: Sequence[float], prediction: Vector) -> list[str]:
+def undescribed(problem: Problem, left: Sequence[float], prediction: Vector) -> list[str]:
     """Sentence on what a model does not describe; none if it describes all data.
 
     Parameters
     ----------
-    experiment : measurements, with their labels
+    problem : measurements, with their labels
     left : misfit of each measurement that is no white noise
     prediction : (rows,) response of the model
     """
-    limits = [LIMITS[measurement.form.scale] for measurement in experiment.measurements]
+    limits = [LIMITS[measurement.form.scale] for measurement in problem.measurements]
     worst = int(np.argmax(np.divide(left, limits)))
     said = []
     if left[worst] > limits[worst]:
-        linear = experiment.measurements[worst].form.scale == "linear"
+        linear = problem.measurements[worst].form.scale == "linear"
         said.append(
             f"it leaves {100.0 * left[worst]:.3g} % of the {'range' if linear else 'value'} of "
-            f"{experiment.labels[worst]} that is no white noise, more than "
+            f"{problem.labels[worst]} that is no white noise, more than "
             f"{100.0 * limits[worst]:g} %"
         )
     beyond: dict[str, tuple[float, str]] = {}
-    models = experiment.as_measurements(prediction)
-    for label, data, model, owner in zip(
-        experiment.labels, experiment.measurements, models, experiment.owners, strict=True
+    models = problem.as_measurements(prediction)
+    for label, data, model, control in zip(
+        problem.labels, problem.measurements, models, problem.controls(), strict=True
     ):
-        control = experiment.models[owner].control
         figures = _local if data.form.scale == "log" else partial(_figures, control=control)
         for name, limit, own, wanted, chance in figures(data, model):
             error = abs(own / wanted - 1.0) - SURE * chance - limit
@@ -192,15 +189,15 @@ def _local(data: Any, model: Any) -> Iterator[tuple[str, float, float, float, fl
 
 def _contradictions(problem: Problem, point: Vector) -> list[str]:
     """Sentence on two measurements that contradict each other; none if they agree."""
-    experiment, best = problem.experiment, problem(point)
-    found = contradiction(best.residual, best.jacobian, experiment.slices)
+    best = problem(point)
+    found = contradiction(best.residual, best.jacobian, problem.slices)
     if found is None:
         return []
     axis, *places = found[:3]
     said = []
     for place, step in zip(places, found[3:], strict=True):
         moved = np.where(np.arange(point.size) == axis, point + step, point)
-        said.append(f"{experiment.labels[place]} about {problem.space.values(moved)[axis]:.3g}")
+        said.append(f"{problem.labels[place]} about {problem.space.values(moved)[axis]:.3g}")
     return [
         f"the measurements contradict each other: alone, {' and '.join(said)} would have for "
         f"{problem.space.names[axis]}, and each would be described at least twice as well: the "
@@ -270,11 +267,11 @@ def doubt_of_units(space: SearchSpace, values: Sequence[float]) -> list[str]:
     """
     stiff: list[str] = []
     slippery: list[str] = []
-    for name, one, bijection, value in zip(
-        space.names, space.parameters, space.bijections, values, strict=True
+    for name, one, coordinate, value in zip(
+        space.names, space.parameters, space.coordinates, values, strict=True
     ):
         if one.key in STIFFNESS:
-            side, where = _off(bijection, value)
+            side, where = _off(coordinate, value)
             units = TOO_STIFF if side > 0 else TOO_SOFT
             told = f"{name} = {value:.4g}, {where}: {units}; if all are right, start nearer"
             stiff += [told] * (side != 0)
@@ -284,18 +281,18 @@ def doubt_of_units(space: SearchSpace, values: Sequence[float]) -> list[str]:
     return stiff or slippery  # a stiffness tells which of the two units is wrong
 
 
-def _off(bijection: Bijection, value: float) -> tuple[int, str]:
+def _off(coordinate: Coordinate, value: float) -> tuple[int, str]:
     """1 if a stiffness ended at its upper bound or far above its start, -1 below, else 0; words."""
-    bound, ratio = bijection.bound_at(value), value / bijection.start
+    bound, ratio = coordinate.bound_at(value), value / coordinate.start
     if bound is not None:
-        return (1 if bound == bijection.high else -1), "at its bound"
+        return (1 if bound == coordinate.high else -1), "at its bound"
     far = f"{max(ratio, 1.0 / ratio):.4g} times {'above' if ratio > 1.0 else 'below'} its start"
     side = (ratio > UNIT_ERROR) - (ratio < 1.0 / UNIT_ERROR)
     return side, f"{far}, which no other material explains"
 
 
 def _of_statics(
-    experiment: Experiment, models: Sequence[Model], uncertainty: Uncertainty, jacobian: Vector
+    problem: Problem, models: Sequence[Model], uncertainty: Uncertainty, jacobian: Vector
 ) -> list[str]:
     """Sentence on how far values of a structure may be off; none if little, or without structure.
 
@@ -304,11 +301,11 @@ def _of_statics(
     response were without them.
     """
     change, curves = np.zeros(jacobian.shape[0]), []
-    pairs = zip(experiment.observations, experiment.slices, experiment.owners, strict=True)
+    pairs = zip(problem.observations, problem.slices, problem.owners, strict=True)
     for observation, rows, owner in pairs:
         if isinstance(observation, ModalObservation):
             curve, more = observation.without_errors(models[owner])
-            change[rows] = experiment.emphasis[rows] * experiment.weight[rows] * more
+            change[rows] = problem.emphasis[rows] * problem.weight[rows] * more
             curves.append(curve)
     if not any(curve.doubts for curve in curves):
         return []

@@ -11,6 +11,7 @@ import dataclasses
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
 from jbeamshell.common.threads import on_one_core
-from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.plan import Plan, planned
+from jbeamshell.identify.plan import Options, Plan, planned
 from jbeamshell.identify.results import Fit
 
 LEVEL = 0.95  # part of the values between the ends that a summary names
@@ -69,14 +69,10 @@ class Fits:
         title = f"{self.converged.size:,} fits, {good:,} converged"
         if not good:
             return Summary(title, [])
-        ends = self.intervals()
+        middle = {key: np.median(own[self.converged]) for key, own in self.values.items()}
         rows = [
-            (
-                key,
-                f"median {np.median(own[self.converged]):.6g}, 95 % between "
-                "{:.6g} and {:.6g}".format(*ends[key]),
-            )
-            for key, own in self.values.items()
+            (key, f"median {middle[key]:.6g}, 95 % between {low:.6g} and {high:.6g}")
+            for key, (low, high) in self.intervals().items()
         ]
         return Summary(title, rows, [f"median misfit {100.0 * np.median(self.misfit):.3g} %"])
 
@@ -127,36 +123,30 @@ def fit_each(
     """
     several = isinstance(data, Sequence) and len(data) > 0
     require("data", data if not several else "given", several, "give a list of measurements")
-    given = Options(**{"throw": False, **options})
+    given, count = Options(**{"throw": False, **options}), len(data)
 
-    def one(place: int, free: Sequence[str | Parameter]) -> Plan:
-        with _naming(place, len(data)):
+    def plan(place: int, free: Sequence[str | Parameter]) -> Plan:
+        with _naming(place, count):
             return planned(data[place], scene, free, options=given)
 
-    first = one(0, free)
-    plans = [first, *(one(place, first.free) for place in range(1, len(data)))]
-    return _found(plans, progress)
-
-
-def _found(plans: Sequence[Plan], progress: Callable[[int, int], None] | None) -> Fits:
-    """Fits of plans, on all cores."""
-
-    def one(place: int) -> Fit:
-        with _naming(place, len(plans)):
+    def fit(plans: Sequence[Plan], place: int) -> Fit:
+        with _naming(place, count):
             return plans[place].found(progress=lambda _: None)
 
+    first = plan(0, free)
+    plans = [first, *(plan(place, first.free) for place in range(1, count))]
     with counting(progress, "fits", "fit") as told, ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = [one(0)]  # threads that miss the same compiled code would all compile it
-        told(1, len(plans))
-        for fit in pool.map(one, range(1, len(plans))):
-            found.append(fit)
-            told(len(found), len(plans))
+        found = [fit(plans, 0)]  # threads that miss the same compiled code would all compile it
+        told(1, count)
+        for one in pool.map(partial(fit, plans), range(1, count)):
+            found.append(one)
+            told(len(found), count)
     return Fits(
-        {key: np.array([fit.values[key] for fit in found]) for key in found[0].values},
-        {key: np.array([fit.errors[key] for fit in found]) for key in found[0].values},
-        np.array([fit.misfit for fit in found]),
-        np.array([fit.converged for fit in found]),
-        [fit.doubts for fit in found],
+        {key: np.array([one.values[key] for one in found]) for key in found[0].values},
+        {key: np.array([one.errors[key] for one in found]) for key in found[0].values},
+        np.array([one.misfit for one in found]),
+        np.array([one.converged for one in found]),
+        [one.doubts for one in found],
     )
 
 

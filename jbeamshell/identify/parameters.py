@@ -1,7 +1,7 @@
 """Free parameters of a fit: their keys, starts, bounds, scales and priors.
 
-A fit knows the keys of the scene, of the rig, of laws of a joint, and of structures.  A bijection
-maps an unbounded search space to the open interval of a parameter.
+A fit knows the keys of the scene, of the rig, of laws of a joint, and of structures.  It searches
+along one coordinate for each number, which has no bounds.
 """
 
 from __future__ import annotations
@@ -19,29 +19,27 @@ from scipy.special import logit
 
 from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.numbers_of import quiet
 from jbeamshell.laws import LAWS, Law, law_named
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.rows import Key
 
 SCALES = ("log", "linear")
-FARTHEST = 40.0  # largest coordinate in the search space; beyond it exp overflows or vanishes
-INSET = 1e-9  # distance of a box from its open bounds, over its width
-AT_BOUND = 1e-3  # distance from a bound, over the box's width, below which a fit ended at it
+FARTHEST = 40.0  # largest coordinate; beyond it exp overflows or vanishes
+AT_BOUND = 1e-3  # distance from a bound, over that of both, below which a fit ended at it
 
 PREFIX = "rig."
 OF_STRUCTURE = "structure."
 ANY = -math.inf  # lower bound of a number of any sign
 
 
-def _row(
-    name: str, sentence: str, unit: str, low: float = 0.0, scale: str = "log"
-) -> tuple[str, Key]:
-    key = PREFIX + name
-    return key, Key(key, "number", 0.0, sentence, unit=unit, low=low, scale=scale, closed=True)
+def _row(name: str, sentence: str, unit: str, low: float = 0.0, scale: str = "log") -> Key:
+    return Key(PREFIX + name, "number", 0.0, sentence, unit=unit, low=low, scale=scale, closed=True)
 
 
-RIG: dict[str, Key] = dict(
-    (
+RIG: dict[str, Key] = {
+    row.name: row
+    for row in (
         _row("compliance", "Compliance of a spring in series.", "length/(force/width)"),
         _row("stiffness", "Stiffness of a spring in parallel.", "(force/width)/length"),
         _row("loss", "Force of damping in parallel at the middle of the cycle.", "force/width"),
@@ -49,7 +47,7 @@ RIG: dict[str, Key] = dict(
         _row("displacement_zero", "Reading of the displacement.", "length", ANY, "linear"),
         _row("drift", "Change of the response's reading over the loop.", "mixed", ANY, "linear"),
     )
-)
+}
 
 
 def law_of(key: object) -> type[Law] | None:
@@ -94,15 +92,15 @@ def check_rig(values: Mapping[str, Any]) -> None:
         require(key, value, number and math.isfinite(value) and value >= low, fix)
 
 
-class Bijection(NamedTuple):
-    """Map from the real line to an open interval; zero maps to the start.
+class Coordinate(NamedTuple):
+    """Coordinate of a free number x on the whole real line, between whose ends lie the bounds of x.
 
-    On the scale t = x or t = log x it is t0 + p without bounds, t_low + (t0 - t_low) exp(p) with
-    one bound, and a logistic curve in p with two.
+    Zero is the start.  On the scale t = x or t = log x, the coordinate p has t = t_0 + p without
+    bounds, t_low + (t_0 - t_low) exp(p) with one bound, and a logistic curve with two.
 
     Attributes
     ----------
-    start, low, high : start and bounds of the parameter x
+    start, low, high : start and bounds of the number
     log : True if the scale is logarithmic
     """
 
@@ -111,78 +109,73 @@ class Bijection(NamedTuple):
     high: float
     log: bool
 
-    def value(self, point: float) -> float:
-        """Parameter at a point of the search space."""
-        return self._unscaled(self._at(float(point))[0])
-
-    def slope(self, point: float) -> float:
-        """Derivative of the parameter with respect to the point."""
-        t, dt = self._at(float(point))
-        return float(dt * self._unscaled(t) if self.log else dt)
-
-    def traced(self, point: Array) -> tuple[Array, Array]:
-        """Parameter at a traced point, and the derivative of its scale t there."""
-        t, dt = self._at(point, jnp)
-        return (jnp.exp(t) if self.log else t), jnp.broadcast_to(jnp.asarray(dt), jnp.shape(point))
-
-    def point(self, value: float) -> float:
-        """Inverse of `value`; values on or beyond a bound are moved inside."""
-        start, low, high = map(self._scaled, (self.start, self.low, self.high))
-        t = self._scaled(value)
-        if np.isfinite(low) and np.isfinite(high):
-            point = logit((t - low) / (high - low)) - logit((start - low) / (high - low))
-        elif np.isfinite(low):
-            point = np.log((t - low) / (start - low)) if t > low else -FARTHEST
-        elif np.isfinite(high):
-            point = -np.log((high - t) / (high - start)) if t < high else FARTHEST
+    @quiet
+    def at(self, p: Any) -> tuple[Any, Any]:
+        """Number at a coordinate, and its derivative; both may be traced."""
+        numbers, (start, low, high) = jnp if isinstance(p, Array) else np, self._ends
+        bounded = np.isfinite(low), np.isfinite(high)
+        if self.log or any(bounded):
+            p = numbers.clip(p, -FARTHEST, FARTHEST)
+        if all(bounded):
+            part = 1.0 / (1.0 + numbers.exp(-p - logit((start - low) / (high - low))))
+            t, dt = low + (high - low) * part, (high - low) * part * (1.0 - part)
+        elif bounded[0]:
+            dt = (start - low) * numbers.exp(p)
+            t = low + dt
+        elif bounded[1]:
+            dt = (high - start) * numbers.exp(-p)
+            t = high - dt
         else:
-            point = (t - start) / self._unit
+            t, dt = start + self.unit * p, self.unit + 0.0 * p
+        x = numbers.clip(numbers.exp(t), self.low, self.high) if self.log else t  # but for rounding
+        return x, dt * x if self.log else dt
+
+    def of(self, x: float) -> float:
+        """Coordinate of a number; numbers on or beyond a bound are moved inside."""
+        (start, low, high), t = self._ends, self._scaled(x)
+        if np.isfinite(low) and np.isfinite(high):
+            p = logit((t - low) / (high - low)) - logit((start - low) / (high - low))
+        elif np.isfinite(low):
+            p = np.log((t - low) / (start - low)) if t > low else -FARTHEST
+        elif np.isfinite(high):
+            p = -np.log((high - t) / (high - start)) if t < high else FARTHEST
+        else:
+            p = (t - start) / self.unit
             if not self.log:
-                return float(point)
-        return float(np.clip(point, -FARTHEST, FARTHEST))
+                return float(p)
+        return float(np.clip(p, -FARTHEST, FARTHEST))
 
-    def boxed(self) -> tuple[Bijection, tuple[float, float]]:
-        """Bijection on the same scale without bounds, and the bounds as a box in its space."""
-        free = Bijection(self.start, 0.0 if self.log else -np.inf, np.inf, self.log)
-        low, high = ((self._scaled(b) - self._scaled(self.start)) / self._unit for b in self[1:3])
-        inset = INSET * (high - low) if np.isfinite(high - low) else INSET
-        return free, (low + inset, high - inset)
+    def between(self, part: float) -> float:
+        """Coordinate at a part of the way from bound to bound, on the scale of the number.
 
-    def bound_at(self, value: float) -> float | None:
-        """Bound at which a value ended; None if it lies inside."""
-        low, high, t = map(self._scaled, (self.low, self.high, value))
-        width = high - low if np.isfinite(high - low) else self._unit
-        at_low, at_high = t - low < AT_BOUND * width, high - t < AT_BOUND * width
-        return self.low if at_low else self.high if at_high else None
+        A missing bound, such as 0 of a logarithm, is a unit away from the start.
+        """
+        start, low, high = self._ends
+        if not np.isfinite(high - low):
+            low, high = max(low, start - self.unit), min(high, start + self.unit)
+        t = low + part * (high - low)
+        return self.of(float(np.exp(t)) if self.log else t)
+
+    def bound_at(self, x: float) -> float | None:
+        """Bound at which a number ended; None if it lies inside."""
+        (_, low, high), t = self._ends, self._scaled(x)
+        near = AT_BOUND * (high - low if np.isfinite(high - low) else self.unit)
+        return self.low if t - low < near else self.high if high - t < near else None
 
     @property
-    def _unit(self) -> float:
+    def unit(self) -> float:
+        """Unit of the scale: a factor e of a logarithm, else the size of the start."""
         return 1.0 if self.log or self.start == 0.0 else abs(self.start)
 
-    def _scaled(self, value: float) -> float:
+    @property
+    def _ends(self) -> tuple[float, float, float]:
+        """Start and bounds on the scale."""
+        return self._scaled(self.start), self._scaled(self.low), self._scaled(self.high)
+
+    def _scaled(self, x: float) -> float:
         if not self.log:
-            return float(value)
-        return float(np.log(value)) if value > 0.0 else -np.inf
-
-    def _unscaled(self, t: float) -> float:
-        return float(np.exp(t)) if self.log else float(t)
-
-    def _at(self, point: Any, numbers: Any = np) -> tuple[Any, Any]:
-        """Parameter on its scale, and its derivative; ``numbers`` is numpy or jax.numpy."""
-        start, low, high = map(self._scaled, (self.start, self.low, self.high))
-        if not (self.log or np.isfinite(low) or np.isfinite(high)):
-            return start + self._unit * point, self._unit
-        p = numbers.clip(point, -FARTHEST, FARTHEST)
-        if np.isfinite(low) and np.isfinite(high):
-            part = 1.0 / (1.0 + numbers.exp(-p - logit((start - low) / (high - low))))
-            return low + (high - low) * part, (high - low) * part * (1.0 - part)
-        if np.isfinite(low):
-            rise = (start - low) * numbers.exp(p)
-            return low + rise, rise
-        if np.isfinite(high):
-            fall = (high - start) * numbers.exp(-p)
-            return high - fall, fall
-        return start + self._unit * p, self._unit
+            return float(x)
+        return float(np.log(x)) if x > 0.0 else -np.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -260,8 +253,8 @@ class Parameter:
         """True if both bounds are finite, so that starts can be spread between them."""
         return bool(np.all(np.isfinite(self.bounds)))
 
-    def bijection(self, start: float) -> Bijection:
-        """Map from the search space; raises `InputError` if the start lies out of bounds."""
+    def coordinate(self, start: float) -> Coordinate:
+        """Coordinate with a start; raises `InputError` if that lies out of bounds."""
         low, high = self.bounds
         if is_of_structure(self.key) and self.low is None and start < 0.0:
             low = ANY
@@ -269,7 +262,7 @@ class Parameter:
         self._require("start", start, low < start < high, fix)
         scale = fitted_row(self.key).scale if self.scale is None else self.scale
         signed = is_of_structure(self.key) and low < 0.0
-        return Bijection(start, low, high, scale == "log" and not signed)
+        return Coordinate(start, low, high, scale == "log" and not signed)
 
     def _check_prior(self) -> None:
         if self.prior is None:

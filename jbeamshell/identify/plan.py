@@ -1,71 +1,117 @@
-"""Plan of a fit: what is known, what the data tell of the rest, and what is fitted.
+"""The way of a fit, from what a user says to its result.
 
-Every fit is a plan first, whether it was asked with arrays, files, a study or the command line, so
-that all have the same defaults.  What is not given follows from the data: the column that drives,
-starts of unknown numbers, and the numbers to fit.
+`fit` takes arrays, the names of files and `Specimen`; a study and the command line come by
+`jbeamshell.identify.plan_file`.  All of them go this way, and have the defaults of `Options`:
+
+1. `planned` makes a `Case` of each `Specimen`: its data as they are compared, and a whole model, of
+   which the data tell what nobody said (`jbeamshell.identify.said`).
+2. `Plan.run` checks the data, and makes the `SearchSpace`: one coordinate without bounds for each
+   number to be found.
+3. `Problem` is residual and Jacobian at a point of that space, and `search` goes to their minimum.
+4. `Fit` has values, errors, doubts and notes.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import jax
-import numpy as np
-
-from jbeamshell.common.checks import require
-from jbeamshell.common.errors import InputError
+from jbeamshell.common.checks import require, require_choice, require_count
+from jbeamshell.common.errors import InputError, Status, UnconvergedError
+from jbeamshell.common.progress import bar
 from jbeamshell.common.threads import on_one_core
 from jbeamshell.identify.assembly import Assembly
-from jbeamshell.identify.choose_free import chosen_free
 from jbeamshell.identify.data_checks import counted_once, inspected
-from jbeamshell.identify.driving import driven
-from jbeamshell.identify.experiment import Experiment
-from jbeamshell.identify.models import LawModel, Model, StripModel
-from jbeamshell.identify.multistart import DEFAULTS, POINTS, FitProgress, Options, found_by
-from jbeamshell.identify.parameters import RIG, Parameter, as_parameters
+from jbeamshell.identify.doubts import doubts_of
+from jbeamshell.identify.models import LawModel
+from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import with_starts
+from jbeamshell.identify.said import said
+from jbeamshell.identify.search import FitProgress, SearchResult, search
 from jbeamshell.identify.search_space import search_space
-from jbeamshell.identify.specimens import Specimen
-from jbeamshell.identify.starts import Estimate, check_starts, doubt_of_strain, estimate, started
-from jbeamshell.laws import LAWS, Law, law_named
-from jbeamshell.measured.curves import AmplitudeCurve, Backbone
-from jbeamshell.measured.form import Measurement
-from jbeamshell.measured.loops import Loop, driver_of
+from jbeamshell.identify.specimens import Case, Specimen
+from jbeamshell.identify.starts import check_starts
+from jbeamshell.identify.uncertainty import uncertainty_at
+from jbeamshell.laws import Law
+from jbeamshell.measured.form import FEWEST_POINTS, Measurement
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene import library
 from jbeamshell.scene.keys import CONTROLS
-from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.toml import overridden, scene_from_values
 
 Datum = Measurement | Specimen | str | os.PathLike[str]
+Progress = Callable[[FitProgress], None]
 
-KINDS = (
-    "give a jbeamshell.Scene, values by dotted key, the name of a scene, a law such as "
-    "jbeamshell.laws.Iwan4(), or its name, such as 'iwan4', or a jbeamshell.identify.Assembly"
-)
+MAX_ITERATIONS = 100
+LAW_ITERATIONS = 200  # laws cost little, and creep to their limits
+STARTS, LAW_STARTS = 3, 6  # searches if all parameters have two bounds, and of laws
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """Settings of a fit and their defaults; see `jbeamshell.identify.fit` for what they mean.
+
+    Raises
+    ------
+    InputError
+        for a value that makes no sense
+    """
+
+    starts: int | None = None
+    noise: float | None = None
+    points: int = 96
+    max_iterations: int | None = None
+    tolerance: float = 1e-7
+    unchecked: bool = False
+    throw: bool = True
+    solver: Newton | None = None
+
+    def __post_init__(self) -> None:
+        require_count("starts", 1 if self.starts is None else self.starts, 1)
+        require_count("points", self.points, FEWEST_POINTS)
+        most = 1 if self.max_iterations is None else self.max_iterations
+        require_count("max_iterations", most, 1)
+        noise = 1.0 if self.noise is None else self.noise
+        fix = "give a positive part of the range, such as 0.01"
+        require("noise", noise, is_number(noise) and noise > 0.0, fix)
+        positive = is_number(self.tolerance) and self.tolerance > 0.0
+        require("tolerance", self.tolerance, positive, "give a positive number, such as 1e-7")
+        valid = self.solver is None or isinstance(self.solver, Newton)
+        require("solver", self.solver, valid, "give a jbeamshell.Newton")
+        for name in ("unchecked", "throw"):
+            require_choice(name, getattr(self, name), (False, True))
+
+    def of(self, problem: Problem) -> tuple[int, int]:
+        """Number of searches of a problem, and of iterations of each."""
+        of_law = isinstance(problem.models[0], LawModel)
+        bounded = all(parameter.bounded for parameter in problem.space.parameters)
+        starts = LAW_STARTS if of_law else STARTS if bounded else 1
+        most = LAW_ITERATIONS if of_law else MAX_ITERATIONS
+        return self.starts or starts, self.max_iterations or most
+
+
+DEFAULTS = Options()
 
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """Fit that is ready to run: all models are whole, and all data as they are compared.
+    """Fit that is ready to run.
 
     Attributes
     ----------
-    specimens : models with their measurements
+    cases : whole models, and measurements as they are compared
     free : parameters to fit
     notes : sentences on what was done to the data, and what was chosen by default
     options : settings of the fit
     doubts : sentences on data that may be wrong
     """
 
-    specimens: Sequence[Specimen]
+    cases: Sequence[Case]
     free: Sequence[Parameter]
     notes: Sequence[str] = ()
     options: Options = DEFAULTS
@@ -73,31 +119,88 @@ class Plan:
 
     @on_one_core
     def run(
-        self,
-        *,
-        save: str | os.PathLike[str] | None = None,
-        progress: Callable[[FitProgress], None] | None = None,
+        self, *, save: str | os.PathLike[str] | None = None, progress: Progress | None = None
     ) -> Fit:
         """Run the fit; arguments, result and errors as for `jbeamshell.identify.fit`."""
         return self.found(save, progress)
 
     def found(
-        self,
-        save: str | os.PathLike[str] | None = None,
-        progress: Callable[[FitProgress], None] | None = None,
+        self, save: str | os.PathLike[str] | None = None, progress: Progress | None = None
     ) -> Fit:
         """Run the fit in a thread of its own."""
-        specimens, doubts = counted_once(self.specimens)
-        keys = [parameter.key for parameter in self.free]
-        doubts = [*self.doubts, *doubts, *inspected(specimens, keys, self.options.unchecked)]
-        parameters = with_starts(self.free, specimens)
-        space, models = search_space(parameters, {one.label: one.model for one in specimens})
-        specimens = [dataclasses.replace(one, scene=models[one.label]) for one in specimens]
-        check_starts(specimens, parameters)
-        given = self.options
-        experiment = Experiment(specimens, points=given.points, noise=given.noise, free=space.keys)
-        problem = Problem(experiment, space, given.solver or Newton(), save)
-        return found_by(problem, given, list(models), doubts, self.notes, progress)
+        given, (cases, copies) = self.options, counted_once(self.cases)
+        found = inspected(cases, [parameter.key for parameter in self.free], given.unchecked)
+        doubts = [*self.doubts, *copies, *found]
+        space, cases = search_space(with_starts(self.free, cases), cases)
+        check_starts(cases, space.keys)
+        problem = Problem(
+            cases, space, points=given.points, noise=given.noise, solver=given.solver, save=save
+        )
+        try:
+            ends = self._searched(problem, progress)
+        except UnconvergedError as error:
+            told = "".join(f"; {sentence}" for sentence in (*doubts, *self.notes))
+            raise UnconvergedError(f"{error}{told}") from None
+        return _fit_at(problem, ends, [case.label for case in cases], doubts, self.notes)
+
+    def _searched(self, problem: Problem, progress: Progress | None) -> list[SearchResult]:
+        """Ends of the searches; progress is shown where a person watches."""
+        starts, most = self.options.of(problem)
+        try:
+            watched: Any = bar("fit") if progress is None else contextlib.nullcontext()
+            with watched as shown:
+
+                def show(now: FitProgress) -> None:
+                    shown.set_postfix_str(str(now))
+                    shown.update()
+
+                ends = search(problem, starts, most, self.options.tolerance, progress or show)
+        except KeyboardInterrupt:
+            kept = (
+                "nothing was saved: give save= (--save on the command line), a file, to continue "
+                "later"
+            )
+            if place := problem.saved_in:
+                kept = f"all are in {place}: fit again with the same arguments to continue"
+            done = f"interrupted after {problem.count} model runs"
+            raise KeyboardInterrupt(f"{done}; {kept}") from None
+        if self.options.throw and not ends[0].converged:
+            named = problem.space.named(problem.space.values(ends[0].point))
+            at = ", ".join(f"{name} = {value:.6g}" for name, value in named.items())
+            raise UnconvergedError(
+                f"the fit has not converged after {most} iterations, at {at}, cost "
+                f"{problem(ends[0].point).cost:.4g}: start closer, free fewer parameters, or raise "
+                "max_iterations"
+            )
+        return ends
+
+
+def _fit_at(
+    problem: Problem,
+    ends: Sequence[SearchResult],
+    labels: Sequence[str],
+    doubts: Sequence[str],
+    notes: Sequence[str],
+) -> Fit:
+    """Fit at the best end of the searches."""
+    space, (point, converged) = problem.space, ends[0]
+    values, uncertainty = space.values(point), uncertainty_at(problem, point)
+    models = [
+        model.replace(space.of(values, owner)).fitted(problem.of(owner))
+        for owner, model in enumerate(problem.models)
+    ]
+    minima = [(space.named(space.values(end.point)), problem(end.point).cost) for end in ends]
+    fit = Fit(
+        problem,
+        uncertainty,
+        {label: model.own for label, model in zip(labels, models, strict=True)},
+        Status.CONVERGED if converged else Status.MAX_ITERATIONS,
+        problem.count,
+        minima,
+        notes=notes,
+    )
+    own = doubts_of(problem, uncertainty, models, fit.left, [cost for _, cost in minima])
+    return dataclasses.replace(fit, doubts=[*own, *doubts])
 
 
 def fit(
@@ -110,9 +213,9 @@ def fit(
     noise: float | None = None,
     save: str | os.PathLike[str] | None = None,
     solver: Newton | None = None,
-    points: int = POINTS,
+    points: int = DEFAULTS.points,
     max_iterations: int | None = None,
-    tolerance: float = 1e-7,
+    tolerance: float = DEFAULTS.tolerance,
     progress: Callable[[FitProgress], None] | None = None,
     throw: bool = True,
     unchecked: bool = False,
@@ -148,8 +251,7 @@ def fit(
     save : file that keeps every model run; if it exists, the fit continues from it
     solver : settings of Newton's method; None takes the defaults
     points : number of points to which each loop is thinned, approximately
-    max_iterations : largest number of iterations of each search; None is 40, for laws 200, after
-        which many starts are tried together
+    max_iterations : largest number of iterations of each search; None is 100, for laws 200
     tolerance : relative change of the parameters at which a search stops; a flat cost stops it too
     progress : called after every step with a `FitProgress`; None shows a bar where a person watches
     throw : True to raise if the fit did not converge; if False, read ``converged``
@@ -213,15 +315,24 @@ def planned(
     """
     chosen = not isinstance(free, list | tuple) or len(free) > 0
     parameters = as_parameters(free) if chosen else ()
-    whole: list[Specimen] = []
+    cases: list[Case] = []
     notes: list[str] = []
     doubts: list[str] = []
     for one in _specimens(data, scene, weights):
-        done, parameters, said, doubted = _completed(one, parameters, folder, options.unchecked)
-        whole.append(done)
-        notes += said
+        dimensions = one.known(folder)
+        meant = said(one, dimensions.values, folder)
+        keys = [parameter.key for parameter in parameters]
+        read = one.read(folder, meant.driver, keys, options.unchecked)
+        taken = [item for item, _ in read]
+        model, parameters, chosen_for_it, doubted = meant.completed(taken, parameters)
+        fix = "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS))
+        require("load.control", model.control, model.control in CONTROLS, fix)
+        cases.append(one.case(model, taken))
+        notes += [f"{item.label}: {note}" for item, told in read for note in told]
+        notes += dimensions.notes
+        notes += [f"{one.label}: {note}" if one.label else note for note in chosen_for_it]
         doubts += doubted
-    return Plan(whole, parameters, notes, options, doubts)
+    return Plan(cases, parameters, notes, options, doubts)
 
 
 def _specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specimen]:
@@ -243,150 +354,3 @@ def _specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specimen
         raise InputError(f"specimens: two have the label {repeated[0]!r}: give each its own")
     pairs = zip(given, labels, strict=True)
     return [dataclasses.replace(one, label=label) for one, label in pairs]
-
-
-Free = tuple[Parameter, ...]
-
-
-def _completed(
-    one: Specimen, free: Free, folder: Path, unchecked: bool
-) -> tuple[Specimen, Free, list[str], list[str]]:
-    """Specimen with a whole model and data as they are compared, what to fit, notes and doubts."""
-    meant, of_model = _meant(one.scene, folder), one.of_model
-    known = one.known(folder)
-    if isinstance(meant, Mapping):
-        meant = overridden(overridden(meant, known.values), of_model)
-        control = meant.get("load.control")
-    elif isinstance(meant, Model):
-        of_strip = known.values if isinstance(meant, StripModel) else {}
-        meant = meant.replace(overridden(of_strip, of_model))
-        control = meant.control
-    else:
-        control = of_model.pop("load.control", None)
-    driver = None if getattr(meant, "by_force", True) else "displacement"
-    driver = control if control in CONTROLS else driver
-    read = one.read(folder, driver, [parameter.key for parameter in free], unchecked)
-    data = [item for item, _ in read]
-    notes = [f"{item.label}: {note}" for item, said in read for note in said]
-    notes += known.notes
-    model: Model
-    said: list[str]
-    doubts: list[str] = []
-    if isinstance(meant, Mapping):
-        model, free, said = _strip(meant, data, free)
-        doubts = doubt_of_strain(meant, model.own, estimate(data))
-    elif isinstance(meant, Model):
-        model, said = meant, []
-        if isinstance(meant, StripModel) and not free:
-            free, note = _chosen(meant.scene, {}, data, estimate(data))
-            said = [note]
-        if not free:
-            raise InputError("free: name what to fit of the structure, by its keys")
-    else:
-        model, free, said = _law(meant, of_model, control, data, free)
-    require(
-        "load.control",
-        model.control,
-        model.control in CONTROLS,
-        "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS)),
-    )
-    notes += [f"{one.label}: {note}" if one.label else note for note in said]
-    whole = model.own if isinstance(model, StripModel) else model
-    return dataclasses.replace(one, scene=whole, data=data, set=one.rig), free, notes, doubts
-
-
-def _meant(scene: Any, folder: Path) -> Any:
-    """Model, law or its class, or known values of a strip, that a user means."""
-    if scene is None:
-        return {}
-    if isinstance(scene, str):
-        if scene in LAWS or scene.startswith("sliders"):
-            return law_named(scene)
-        of_file = scene.endswith(".toml") or os.path.isfile(folder / scene)
-        fix = f"choose a law ({', '.join(LAWS)}), a scene ({', '.join(library.NAMES)}), or a file"
-        require("scene", scene, of_file or scene in library.NAMES, fix)
-        return library.values_from(scene, folder)
-    require("scene", scene, isinstance(scene, Scene | Model | Law | Mapping), KINDS)
-    return StripModel(scene) if isinstance(scene, Scene) else scene
-
-
-def _strip(
-    known: Mapping[str, Any], data: Sequence[Measurement], free: Free
-) -> tuple[StripModel, Free, list[str]]:
-    """Strip of known values, of which the data tell the rest; see `chosen_free` and `started`."""
-    own, notes = dict(known), []
-    loops = [item for item in data if isinstance(item, Loop)]
-    if "load.control" not in own and loops:
-        driver = own["load.control"] = driver_of(loops)
-        notes.append(f"the {driver} drives these loops (set load.control to change it)")
-        if driver != "force":
-            own.pop("load.amplitude", None)
-    control = own.get("load.control", "force")
-    found = estimate(data) if control in CONTROLS else None
-    if not free:
-        free, note = _chosen(None, own, data, found)
-        notes.append(note)
-    if "load.entry" not in own:
-        notes.append("the force enters a member that goes on (set load.entry to change it)")
-    if found is not None:
-        given = {p.key: p.start for p in free if p.start is not None and p.key not in RIG}
-        own, fresh = started(overridden(own, given), found)
-        notes += fresh
-    if "load.amplitude" not in own and control in CONTROLS:
-        drives = [
-            item.amplitude if isinstance(item, AmplitudeCurve) else getattr(item, control, None)
-            for item in data
-        ]
-        largest = [float(np.max(np.abs(drive))) for drive in drives if drive is not None]
-        if largest:
-            own["load.amplitude"] = max(largest)
-    scene = scene_from_values(own)
-    mounting = in_words(scene, [parameter.key for parameter in free])
-    return StripModel(scene), free, [*notes, *filter(None, [mounting])]
-
-
-def _chosen(
-    scene: Scene | None,
-    known: Mapping[str, Any],
-    data: Sequence[Measurement],
-    found: Estimate | None,
-) -> tuple[Free, str]:
-    """Parameters that the data tell of a whole scene or of known values, and why."""
-    reasons = chosen_free(scene, known, data, found)
-    told = "; ".join(f"{key} ({reason})" for key, reason in reasons.items())
-    note = f"Fitted: {told}; choose with free= (--free on the command line)"
-    return as_parameters(list(reasons)), note
-
-
-def _law(
-    meant: Any,
-    known: Mapping[str, Any],
-    control: str | None,
-    data: Sequence[Measurement],
-    free: Free,
-) -> tuple[LawModel, Free, list[str]]:
-    """Law of a joint with known numbers, which starts from the data where it was only named."""
-    model = driven(meant, data, control)
-    given = {p.key: p.start for p in free if p.start is not None and p.key not in RIG}
-    model = model.replace({**known, **given})
-    notes = [f"{model.law.heading} in place of a strip, driven by the {model.control}"]
-    if not free:
-        left = [key for key in model.law.free() if key not in known]
-        told = _told(model.law, data, left)
-        free = as_parameters(told)
-        notes += [
-            f"{key} stays as it is: a first loading tells nothing of it"
-            for key in left
-            if key not in told
-        ]
-    return model, free, notes
-
-
-def _told(law: Law, data: Sequence[Measurement], keys: Sequence[str]) -> list[str]:
-    """Those of a law's keys that the data tell: first loadings tell nothing of unloading."""
-    if not all(isinstance(item, Backbone) for item in data):
-        return list(keys)
-    way = np.concatenate([item.displacement for item in data if isinstance(item, Backbone)])
-    numbers = {key: law.get(key) for key in keys}
-    slopes = jax.jacfwd(lambda values: law.replace(values).backbone(way))(numbers)
-    return [key for key in keys if np.any(np.asarray(slopes[key]) != 0.0)]

@@ -39,13 +39,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jbeamshell.common.checks import require, shown
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
 from jbeamshell.identify.assembly import Assembly
-from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.plan import Plan, planned
+from jbeamshell.identify.plan import Options, Plan, planned
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import law_named
 from jbeamshell.scene import library
@@ -125,32 +124,27 @@ def _specimen(
     folder: Path,
 ) -> Specimen:
     """Specimen of its table, of the model that all share."""
-    own = _entries(table)
+    own, name = _entries(table), values.get("scene")
     model, common, structure = values.get("model", ""), tables["set"], tables["structure"]
     if model != "":
         law_named(model)
         fix = f"the law {model!r} takes its place: leave it out"
-        require("scene", values.get("scene"), values.get("scene") is None, fix)
+        require("scene", name, name is None, fix)
         return dataclasses.replace(own, scene=model, set={**common, **own.set})
+    require(
+        "scene", name, name is None or isinstance(name, str), "give the name of a scene, or a file"
+    )
+    base = {} if name is None else library.values_from(name, folder)
     shared = Specimen(set=common)
-    scene: Any = overridden(_base(values.get("scene"), folder), shared.of_model)
+    scene: Any = overridden(base, shared.of_model)
     if structure:
         _check_names("structure", structure, OF_STRUCTURE)
-        for name in ("mass", "stiffness"):
-            require(f"structure.{name}", "missing", name in structure, "give a matrix")
+        for entry in ("mass", "stiffness"):
+            require(f"structure.{entry}", "missing", entry in structure, "give a matrix")
         known = overridden(overridden(scene, own.known(folder).values), own.of_model)
         scene = Assembly.of(scene_from_values(known), **structure)
         own = dataclasses.replace(own, set=own.rig)
     return dataclasses.replace(own, scene=scene, set={**shared.rig, **own.set})
-
-
-def _base(scene: Any, folder: Path) -> dict[str, Any]:
-    """Dotted values of a named scene or of a file; none means the standard scene."""
-    if scene is None:
-        return {}
-    if not isinstance(scene, str):
-        raise InputError(f"scene = {scene!r}: give the name of a scene, or a file")
-    return library.values_from(scene, folder)
 
 
 def _entries(table: Mapping[str, Any]) -> Specimen:
@@ -164,8 +158,8 @@ def _entries(table: Mapping[str, Any]) -> Specimen:
         _check_table(f"specimen {label!r}: {name}", table.get(name, {}))
     for name in ("columns", "units"):
         for quantity, word in table.get(name, {}).items():
-            if not isinstance(word, str):
-                raise InputError(f"specimen {label!r}: {name}.{quantity} = {word!r}: give a word")
+            where = f"specimen {label!r}: {name}.{quantity}"
+            require(where, word, isinstance(word, str), "give a word")
     return Specimen(**{**table, "label": label})
 
 
@@ -173,15 +167,12 @@ def _parameter(key: str, table: Any) -> dict[str, Any]:
     _check_table(f"free.{key!r}", table)
     fields = [field.name for field in dataclasses.fields(Parameter) if field.name != "key"]
     _check_names(f"free.{key!r}", table, fields)
-    options = dict(table)
-    if isinstance(options.get("prior"), list):
-        options["prior"] = tuple(options["prior"])
-    return options
+    prior = table.get("prior")
+    return {**table, "prior": tuple(prior)} if isinstance(prior, list) else dict(table)
 
 
 def _check_table(name: str, table: Any) -> None:
-    if not isinstance(table, Mapping):
-        raise InputError(f"{name} = {shown(table)}: must be a table")
+    require(name, table, isinstance(table, Mapping), "must be a table")
 
 
 def _check_names(where: str, table: Mapping[str, Any], known: Sequence[str]) -> None:

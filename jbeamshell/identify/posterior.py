@@ -57,7 +57,7 @@ class Posterior:
 
     def constrain(self, theta: ArrayLike) -> Array:
         """Parameters (n,) within their bounds at a point (n,), traced or not."""
-        return self._values_and_scales(jnp.asarray(theta))[0]
+        return jnp.asarray(self._space.at(jnp.asarray(theta))[0])
 
     def unconstrain(self, values: ArrayLike) -> NDArray[np.float64]:
         """Point (n,) at parameters (n,) within their bounds."""
@@ -69,7 +69,7 @@ class Posterior:
         It can be traced, mapped and differentiated once.
         """
         u, at = self.uncertainty, jnp.asarray(values)
-        rise = (_cost(self.problem, self._space)(at) - self.least) / u.sigma**2
+        rise = (_cost(self.problem)(at) - self.least) / u.sigma**2
         if u.freedom is None:
             return -0.5 * rise
         # The density whose marginals are the fit's intervals, where the model is linear.
@@ -82,25 +82,21 @@ class Posterior:
         the factor of the change of variables. It can be traced, mapped and differentiated once.
         """
         point = jnp.asarray(theta)
-        values, scales = self._values_and_scales(point)
+        values, slopes = self._space.at(point)
+        logs = np.array([one.log for one in self._space.coordinates])
+        scales = jnp.where(logs, slopes / values, slopes)
         # A flat density on the scale t is dt/dtheta here; a normal one of x has dx/dt too.
         total = self.loglikelihood(values) + jnp.sum(jnp.log(scales))
         for axis, mean, deviation in self.problem.priors:
             value = values[axis]
             total = total - 0.5 * ((value - mean) / deviation) ** 2
-            if self._space.bijections[axis].log:
+            if logs[axis]:
                 total = total + jnp.log(value)
         return total
 
     @property
     def _space(self) -> SearchSpace:
         return self.uncertainty.space
-
-    def _values_and_scales(self, point: Array) -> tuple[Array, Array]:
-        """Parameters (n,), and the derivatives (n,) of their scales with respect to the point."""
-        pairs = [bijection.traced(p) for bijection, p in zip(self._space.bijections, point)]  # noqa: B905 - a traced point has no length to check
-        values, scales = zip(*pairs, strict=True)
-        return jnp.stack(values), jnp.stack(scales)
 
 
 def posterior(problem: Problem, uncertainty: Uncertainty) -> Posterior:
@@ -110,29 +106,24 @@ def posterior(problem: Problem, uncertainty: Uncertainty) -> Posterior:
             raise InputError(
                 f"posterior: {name} ended at its bound; widen its bounds, or leave it out"
             )
-    rows = problem.experiment.weight.size
+    rows = problem.weight.size
     best = problem(uncertainty.point).residual[:rows]
     return Posterior(problem, uncertainty, float(best @ best))
 
 
-def _cost(problem: Problem, space: SearchSpace) -> jax.custom_jvp:
+def _cost(problem: Problem) -> jax.custom_jvp:
     """Function of the parameters (n,): sum of the squared residuals of the data.
 
     The model is differentiated forward, with the residuals; gradients need no second run.
     """
 
-    def both(values: Array) -> tuple[Array, Array]:
-        table = values[space.table]
-        cost, slopes = problem.experiment.traced_cost(space.keys, table, problem.solver)
-        return cost, jnp.zeros_like(values).at[space.table].add(slopes)
-
     @jax.custom_jvp
     def cost(values: Array) -> Array:
-        return both(values)[0]
+        return problem.traced_cost(values)[0]
 
     @cost.defjvp
     def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
-        found, gradient = both(primals[0])
+        found, gradient = problem.traced_cost(primals[0])
         return found, gradient @ tangents[0]
 
     return cost

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import bar
-from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.parameters import FARTHEST
 from jbeamshell.identify.problem import Problem
-from jbeamshell.identify.search import StoppingRule, minimise
+from jbeamshell.identify.search import minimise
 from jbeamshell.identify.uncertainty import Uncertainty, check_level
 
 MOST_POINTS = 8  # evaluations to either side
@@ -76,13 +75,11 @@ def profile(
     check_level(level)
     space, best = uncertainty.space, uncertainty.point
     axis = space.names.index(name)
-    bijection = space.bijections[axis]
+    coordinate = space.coordinates[axis]
     if uncertainty.at_bound[axis]:
         raise InputError(f"profile {name!r}: it ended at its bound; widen its bounds and fit again")
-    others = np.delete(np.arange(best.size), axis)
     along = uncertainty.inverse[:, axis] / uncertainty.inverse[axis, axis]
     least, wanted = problem(best).cost, uncertainty.quantile(level)
-    stopping = StoppingRule(max_iterations, tolerance)
     points, roots, settled = {0.0: best}, {0.0: 0.0}, True
 
     def root_at(step: float) -> float:
@@ -92,17 +89,9 @@ def profile(
         nearest = min(points, key=lambda known: abs(known - step))
         whole = points[nearest] + np.clip((step - nearest) * along, -NUDGE, NUDGE)
         whole[axis] = best[axis] + step
-
-        def evaluate(part: NDArray[np.float64]) -> Evaluation:
-            evaluation = problem(np.insert(part, axis, whole[axis]))
-            return evaluation._replace(jacobian=evaluation.jacobian[:, others])
-
-        if others.size:
-            end = minimise(evaluate, whole[others], stopping)
-            whole[others] = end.point
-            settled &= end.converged
-        points[step] = whole
-        rise = max(evaluate(whole[others]).cost - least, 0.0)
+        points[step], converged = minimise(problem, whole, max_iterations, tolerance, held=[axis])
+        settled &= converged
+        rise = max(problem(points[step]).cost - least, 0.0)
         roots[step] = float(np.sqrt(rise) / uncertainty.sigma)
         return roots[step]
 
@@ -114,10 +103,10 @@ def profile(
             shown.update()
             return root_at(step)
 
-        for side, bound in ((-1.0, bijection.low), (1.0, bijection.high)):
+        for side, bound in ((-1.0, coordinate.low), (1.0, coordinate.high)):
             step = _crossing(counted, side, wanted, first)
-            ends.append(bound if step is None else bijection.value(best[axis] + step))
-    pairs = sorted((bijection.value(best[axis] + step), root) for step, root in roots.items())
+            ends.append(bound if step is None else coordinate.at(best[axis] + step)[0])
+    pairs = sorted((coordinate.at(best[axis] + step)[0], root) for step, root in roots.items())
     values, heights = np.array(pairs).T
     return Profile(name, values, heights**2, (min(ends), max(ends)), level, settled)
 

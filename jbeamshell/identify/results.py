@@ -19,11 +19,11 @@ from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.frames import frame
 from jbeamshell.common.summary import Summary
 from jbeamshell.identify.doubts import undescribed
-from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.models import as_model
 from jbeamshell.identify.posterior import Posterior, posterior
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.profile_likelihood import MAX_ITERATIONS, TOLERANCE, Profile, profile
+from jbeamshell.identify.runs import Evaluation
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, model_misfit
 from jbeamshell.laws import Law
 from jbeamshell.measured.form import LOOP, by_form
@@ -64,7 +64,7 @@ class Fit:
     @cached_property
     def values(self) -> dict[str, float]:
         """Fitted value by key, or by "key[specimen]" where every specimen has its own."""
-        space = self.uncertainty.space
+        space = self.problem.space
         return space.named(space.values(self.uncertainty.point))
 
     @cached_property
@@ -89,23 +89,22 @@ class Fit:
     @property
     def labels(self) -> Sequence[str]:
         """Labels of the measurements, no two alike."""
-        return self.problem.experiment.labels
+        return self.problem.labels
 
     @property
     def data(self) -> list[Any]:
         """Fitted measurements, loops thinned."""
-        return self.problem.experiment.measurements
+        return self.problem.measurements
 
     @cached_property
     def model(self) -> list[Any]:
         """Measurements as the model answers them."""
-        return self.problem.experiment.as_measurements(self._best.prediction)
+        return self.problem.as_measurements(self._best.prediction)
 
     @property
     def controls(self) -> list[str]:
         """Column that drives the model, for every measurement."""
-        experiment = self.problem.experiment
-        return [experiment.models[owner].control for owner in experiment.owners]
+        return self.problem.controls()
 
     @property
     def misfit(self) -> float:
@@ -128,7 +127,7 @@ class Fit:
 
         Or it misses the energy per cycle or the secant stiffness of a loop.
         """
-        return not undescribed(self.problem.experiment, self.left, self._best.prediction)
+        return not undescribed(self.problem, self.left, self._best.prediction)
 
     @cached_property
     def _best(self) -> Evaluation:
@@ -137,10 +136,9 @@ class Fit:
     @property
     def _relative(self) -> list[NDArray[np.float64]]:
         """Residuals of every measurement over its range."""
-        experiment, best = self.problem.experiment, self._best
-        rows = experiment.weight.size
-        plain = best.residual[:rows] / experiment.emphasis * experiment.relative
-        return [plain[own] for own in experiment.slices]
+        problem = self.problem
+        plain = self._best.residual[: problem.weight.size] / problem.emphasis * problem.relative
+        return [plain[own] for own in problem.slices]
 
     @property
     def converged(self) -> bool:
@@ -250,12 +248,12 @@ class Fit:
         -------
         Lower and upper end for every measurement, each a measurement of the same kind
         """
-        best, experiment, u = self._best, self.problem.experiment, self.uncertainty
-        per_noise = 1.0 / experiment.weight
-        jacobian = best.jacobian[: per_noise.size] * (per_noise / experiment.emphasis)[:, None]
+        best, problem, u = self._best, self.problem, self.uncertainty
+        per_noise = 1.0 / problem.weight
+        jacobian = best.jacobian[: per_noise.size] * (per_noise / problem.emphasis)[:, None]
         if self.noises:  # residuals are distances then, not differences of the response
             steps = SMALL * np.diag(np.sqrt(np.diag(u.covariance)))
-            ends = [[self.problem(u.point + s * d).prediction for s in (-1.0, 1.0)] for d in steps]
+            ends = [[problem(u.point + s * d).prediction for s in (-1.0, 1.0)] for d in steps]
             rises = [
                 (high - low) / (2.0 * np.sum(d)) if np.any(d) else np.zeros(per_noise.size)
                 for (low, high), d in zip(ends, steps, strict=True)
@@ -265,7 +263,7 @@ class Fit:
         variance += (u.scatter * per_noise) ** 2 * noise
         width = u.quantile(level) * np.sqrt(variance)
         sides = (best.prediction + side * width for side in (-1.0, 1.0))
-        return list(zip(*map(experiment.as_measurements, sides), strict=True))
+        return list(zip(*map(problem.as_measurements, sides), strict=True))
 
     def profile(
         self,

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.models import Model
-from jbeamshell.identify.observations import LoopObservation, Observation
+from jbeamshell.identify.observations import LoopObservation, Observation, observe
 from jbeamshell.identify.parameters import PREFIX, RIG, Parameter, check_rig
-from jbeamshell.identify.specimens import Specimen
+from jbeamshell.identify.specimens import Case
 from jbeamshell.measured.curves import Backbone
 from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
@@ -77,16 +77,16 @@ def rig_of(values: Mapping[str, Any]) -> Rig:
     return Rig(**{name: jnp.asarray(value) for name, value in fields.items()})
 
 
-def with_starts(free: Sequence[Parameter], specimens: Sequence[Specimen]) -> tuple[Parameter, ...]:
+def with_starts(free: Sequence[Parameter], cases: Sequence[Case]) -> tuple[Parameter, ...]:
     """Parameters of which those of the rig have starts, and zeros and drift bounds, from loops."""
     own = [parameter for parameter in free if parameter.key in RIG]
     if not own:
         return tuple(free)
-    held = {key: value for one in specimens for key, value in one.rig.items()}
+    held = {key: value for case in cases for key, value in case.rig.items()}
     loops = [
-        (item, one.model.control)
-        for one in specimens
-        for item in one.measurements
+        (item, case.model.control)
+        for case in cases
+        for item in case.measurements
         if isinstance(item, Loop | Backbone)
     ]
     if not loops:
@@ -185,30 +185,27 @@ class RiggedObservation(LoopObservation):
         return jnp.interp(asked, way, jnp.append(zero, force)), converged & reached
 
 
-def rigged(
-    measurement: Measurement,
-    observation: Observation,
-    model: Model,
-    values: Mapping[str, Any],
-    free: Sequence[str],
-) -> RiggedObservation:
-    """Observation of a loop or a backbone through a rig.
+def observed(
+    measurement: Measurement, model: Model, values: Mapping[str, Any], free: Sequence[str] = ()
+) -> Observation:
+    """Run of the model that reproduces a measurement, through a rig if there is one.
 
     Parameters
     ----------
-    measurement : loop or backbone
-    observation : its run without a rig
-    model : strip, or law
+    measurement : loop or backbone, or without a rig anything that `observe` knows
+    model : strip, law or structure
     values : values of the rig that are not 0, by dotted key
     free : keys of the rig that a fit may change
 
     Raises
     ------
     InputError
-        for another measurement, for unknown keys, or for a spring or damping in parallel where the
-        force is prescribed
+        for a rig about another measurement, for unknown keys, or for a spring or damping in
+        parallel where the force is prescribed
     """
-    given = [*values, *free]
+    observation, given = observe(measurement, model), [*values, *free]
+    if not given:
+        return observation
     if not isinstance(observation, LoopObservation):
         raise InputError(f"{measurement.label}: {given[0]} changes loops and backbones only")
     rig = rig_of(values)
@@ -245,7 +242,7 @@ def rigged(
 
 
 def with_rig(observation: Observation, values: Mapping[str, Array]) -> RiggedObservation:
-    """Observation made by `rigged` with other values of the rig, by dotted key."""
+    """Observation through a rig with other values of that, by dotted key."""
     assert isinstance(observation, RiggedObservation)
     names = [key.removeprefix(PREFIX) for key in values]
     return eqx.tree_at(

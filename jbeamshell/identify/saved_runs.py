@@ -11,6 +11,7 @@ import json
 import os
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import numpy as np
@@ -18,9 +19,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, write_text
-from jbeamshell.identify.experiment import Evaluation, Experiment
-from jbeamshell.identify.search_space import SearchSpace
-from jbeamshell.numerics.newton import Newton
+from jbeamshell.identify.runs import Evaluation
 
 FORMAT = "jbeamshell fit 4"
 LONGEST_HEADER = 1000  # characters
@@ -37,17 +36,17 @@ class SavedRuns:
     path : the file
     """
 
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        experiment: Experiment,
-        space: SearchSpace,
-        solver: Newton,
-    ) -> None:
-        """Name the file of the runs of an experiment over a search space, by a solver."""
+    def __init__(self, path: str | os.PathLike[str], words: Any, trees: Any) -> None:
+        """Name the file of the runs of a fit.
+
+        Parameters
+        ----------
+        path : the file
+        words, trees : all that determines the predictions but the parameters' values, in words and
+            as pytrees
+        """
         self.path = as_path(path)
-        mark = _fingerprint(experiment, space.keys, solver)
-        self._header = json.dumps({"format": FORMAT, "fingerprint": mark})
+        self._header = json.dumps({"format": FORMAT, "fingerprint": _fingerprint(words, trees)})
 
     def read(self) -> list[Run]:
         """Values and prediction of every run so far; begins the file if there is none.
@@ -108,10 +107,10 @@ class SavedRuns:
         return hashlib.sha256((self._header + body).encode(errors="replace")).hexdigest()
 
 
-def _fingerprint(experiment: Experiment, keys: tuple[str, ...], solver: Newton) -> str:
-    """Hash of everything that determines the predictions, except the parameters' values."""
-    digest = hashlib.sha256(repr((keys, solver, experiment.owners)).encode())
-    for part in (experiment.models, experiment.observations):
+def _fingerprint(words: Any, trees: Any) -> str:
+    """Hash of words, and of the leaves and the structure of pytrees."""
+    digest = hashlib.sha256(repr(words).encode())
+    for part in trees:
         digest.update(re.sub(r"0x[0-9a-f]+", "", str(jax.tree.structure(part))).encode())
         for leaf in jax.tree.leaves(part):
             if isinstance(leaf, jax.Array | np.ndarray):

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.models import Model
-from jbeamshell.identify.parameters import RIG, Bijection, Parameter
+from jbeamshell.identify.parameters import RIG, Coordinate, Parameter
+from jbeamshell.identify.specimens import Case
 
 
 class SearchSpace(NamedTuple):
@@ -21,31 +24,43 @@ class SearchSpace(NamedTuple):
     keys : (k,) dotted keys of the parameters
     names : (n,) names of the axes: the key, followed by the specimen's label in brackets if every
         specimen has a value of its own
-    bijections : (n,) maps from the axes to the values
+    coordinates : (n,) coordinate of each axis
     table : (specimens, k) axis of each key of each specimen
     parameters : (n,) parameter behind each axis
     """
 
     keys: tuple[str, ...]
     names: tuple[str, ...]
-    bijections: tuple[Bijection, ...]
+    coordinates: tuple[Coordinate, ...]
     table: NDArray[np.int64]
     parameters: tuple[Parameter, ...]
 
+    def at(self, point: Any) -> tuple[Any, Any]:
+        """Values (n,) at a point (n,), and their derivatives (n,); both may be traced."""
+        pairs = [one.at(point[axis]) for axis, one in enumerate(self.coordinates)]
+        stack = jnp.stack if isinstance(point, Array) else np.array
+        values, slopes = zip(*pairs, strict=True)
+        return stack(values), stack(slopes)
+
     def values(self, point: ArrayLike) -> NDArray[np.float64]:
-        """Parameters (n,) at a point (n,) of the search space."""
-        pairs = zip(self.bijections, np.asarray(point), strict=True)
-        return np.array([bijection.value(p) for bijection, p in pairs])
+        """Values (n,) at a point (n,)."""
+        found: NDArray[np.float64] = self.at(np.asarray(point, dtype=float))[0]
+        return found
 
     def slopes(self, point: ArrayLike) -> NDArray[np.float64]:
-        """Derivatives (n,) of the parameters with respect to the point (n,)."""
-        pairs = zip(self.bijections, np.asarray(point), strict=True)
-        return np.array([bijection.slope(p) for bijection, p in pairs])
+        """Derivatives (n,) of the values with respect to the point (n,)."""
+        found: NDArray[np.float64] = self.at(np.asarray(point, dtype=float))[1]
+        return found
 
     def point(self, values: ArrayLike) -> NDArray[np.float64]:
-        """Point (n,) of the search space at given parameters (n,)."""
-        pairs = zip(self.bijections, np.asarray(values), strict=True)
-        return np.array([bijection.point(value) for bijection, value in pairs])
+        """Point (n,) of given values (n,)."""
+        pairs = zip(self.coordinates, np.asarray(values), strict=True)
+        return np.array([one.of(x) for one, x in pairs])
+
+    def bounds_at(self, point: ArrayLike) -> list[float | None]:
+        """Bounds (n,) at which the values of a point ended; None for those that lie inside."""
+        pairs = zip(self.coordinates, self.values(point).tolist(), strict=True)
+        return [one.bound_at(x) for one, x in pairs]
 
     def of(self, values: ArrayLike, specimen: int) -> dict[str, float]:
         """Values of one specimen's scene by key."""
@@ -57,22 +72,16 @@ class SearchSpace(NamedTuple):
         """Values (n,) by the names of their axes."""
         return dict(zip(self.names, np.asarray(values).tolist(), strict=True))
 
-    def boxed(self) -> tuple[SearchSpace, NDArray[np.float64]]:
-        """Space on the same scales without bounds, and the bounds as a box (n, 2) in it."""
-        pairs = [bijection.boxed() for bijection in self.bijections]
-        free, boxes = zip(*pairs, strict=True)
-        return self._replace(bijections=free), np.array(boxes)
-
 
 def search_space(
-    free: Sequence[Parameter], scenes: Mapping[str, Model]
-) -> tuple[SearchSpace, dict[str, Model]]:
-    """Search space of several specimens' parameters, and their scenes at its start.
+    free: Sequence[Parameter], cases: Sequence[Case]
+) -> tuple[SearchSpace, list[Case]]:
+    """Search space of several specimens' parameters, and the cases at its start.
 
     Parameters
     ----------
     free : parameters to fit, no key twice
-    scenes : scene of each specimen by its label
+    cases : models of the specimens, no two of one label
 
     Raises
     ------
@@ -81,13 +90,13 @@ def search_space(
         start a shared parameter at different values
     """
     given = {p.key: p.start for p in free if p.start is not None and p.key not in RIG}
-    started = {label: scene.replace(given) for label, scene in scenes.items()}
+    started = [case._replace(model=case.model.replace(given)) for case in cases]
     names: list[str] = []
     owners: list[Parameter] = []
-    bijections: list[Bijection] = []
+    coordinates: list[Coordinate] = []
     columns: list[list[int]] = []
     for parameter in free:
-        starts = [_start(scene, parameter) for scene in started.values()]
+        starts = [_start(case.model, parameter) for case in started]
         if not parameter.each and len(set(starts)) > 1:
             low, high = min(starts), max(starts)
             raise InputError(
@@ -95,20 +104,20 @@ def search_space(
                 f"{high:g}: give one start, or each=True"
             )
         several = parameter.each and len(started) > 1
-        labels = list(started) if several else [""]
+        labels = [case.label for case in started] if several else [""]
         first = len(names)
         names += [f"{parameter.key}[{label}]" if label else parameter.key for label in labels]
-        bijections += [parameter.bijection(start) for start in starts[: len(labels)]]
+        coordinates += [parameter.coordinate(start) for start in starts[: len(labels)]]
         owners += [parameter] * len(labels)
         columns.append([first + (i if several else 0) for i in range(len(started))])
     keys = tuple(parameter.key for parameter in free)
     table = np.array(columns).T
-    return SearchSpace(keys, tuple(names), tuple(bijections), table, tuple(owners)), started
+    return SearchSpace(keys, tuple(names), tuple(coordinates), table, tuple(owners)), started
 
 
-def _start(scene: Model, parameter: Parameter) -> float:
+def _start(model: Model, parameter: Parameter) -> float:
     key = parameter.key
-    start: Any = parameter.start if key in RIG else scene.get(key)
+    start: Any = parameter.start if key in RIG else model.get(key)
     if start is None:
         raise InputError(f"free {key!r}: the scene has no value for it; give a start")
     if np.ndim(start) > 0:

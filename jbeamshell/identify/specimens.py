@@ -1,4 +1,4 @@
-"""Specimens of a fit: a strip, a joint or a structure, and what was measured on it."""
+"""Specimens of a fit, as users say them, and the cases that come of them with whole models."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import dataclasses
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require, shown
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml
 from jbeamshell.identify.models import Model, StripModel, as_model
@@ -39,6 +39,25 @@ WRONG_DRIVE = (
 QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
 OF_SHEAR = ("strip.kappa_s", "strip.poisson_ratio", "strip.curvature")
 ZEROS = {"rig.force_zero", "rig.displacement_zero"}
+
+
+class Case(NamedTuple):
+    """Whole model of one specimen, and its measurements as they are compared.
+
+    Attributes
+    ----------
+    model : strip, law or structure
+    measurements : what was measured
+    weights : (measurements,) factors of the residuals, besides the curves' own
+    rig : values of the rig by dotted key; those that are not named are 0
+    label : name in messages and in the names of the specimen's own values
+    """
+
+    model: Model
+    measurements: Sequence[Any]
+    weights: NDArray[np.float64]
+    rig: Mapping[str, Any] = {}
+    label: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,29 +112,17 @@ class Specimen:
     dimensions: Mapping[str, Any] | str = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        words = {
-            "kind": tuple(KINDS),
-            "cycles": CYCLES,
-            "drift": DRIFTS,
-            "driver": (None, *CONTROLS),
-        }
-        words["reverse"] = (None, *QUANTITIES)
+        drives = {"driver": (None, *CONTROLS), "reverse": (None, *QUANTITIES)}
+        words = {"kind": tuple(KINDS), "cycles": CYCLES, "drift": DRIFTS, **drives}
         for name, known in words.items():
             value = getattr(self, name)
-            if not (value is None or isinstance(value, str)) or value not in known:
-                names = ", ".join(repr(word) for word in known if word)
-                raise InputError(f"{name} = {shown(value)}: choose among {names}")
-        if self.centre not in (None, True, False):
-            raise InputError(f"centre = {self.centre!r}: give true or false")
-        if not (is_number(self.width) and self.width > 0.0):
-            raise InputError(f"width = {shown(self.width)}: give a positive number")
+            valid = (value is None or isinstance(value, str)) and value in known
+            require(name, value, valid, f"choose among {', '.join(repr(w) for w in known if w)}")
+        require("centre", self.centre, self.centre in (None, True, False), "give true or false")
+        positive = is_number(self.width) and self.width > 0.0
+        require("width", self.width, positive, "give a positive number")
         require("set", self.set, isinstance(self.set, Mapping), "give values by dotted key")
         check_rig(self.rig)
-
-    @property
-    def model(self) -> Model:
-        """Model of a scene, a law or a structure that is whole."""
-        return as_model(self.scene)
 
     @property
     def rig(self) -> dict[str, Any]:
@@ -133,9 +140,12 @@ class Specimen:
         one = isinstance(self.data, str) or not isinstance(self.data, Sequence)
         return [self.data] if one else list(self.data)
 
-    def checked_weights(self) -> NDArray[np.float64]:
-        """Weights (measurements,); raises `InputError` unless there are none or one for each."""
-        count, where = len(self.measurements), f" of {self.label!r}" if self.label else ""
+    def case(self, model: Any, data: Sequence[Any]) -> Case:
+        """Case of the specimen with a whole model and data as they are compared.
+
+        Raises `InputError` unless there are no weights or one for each measurement.
+        """
+        count, where = len(data), f" of {self.label!r}" if self.label else ""
         fix = f"give one positive number for each of the {count} measurements"
         several = isinstance(self.weights, list | tuple | np.ndarray)
         require(f"weights{where}", self.weights, several, fix)
@@ -143,7 +153,7 @@ class Specimen:
         weights = given if given.size else np.ones(count)
         if weights.shape != (count,) or not np.all(np.isfinite(weights) & (weights > 0.0)):
             raise InputError(f"weights{where} = {given.tolist()}: {fix}")
-        return weights
+        return Case(as_model(model), data, weights, self.rig, self.label)
 
     def known(self, folder: Path) -> Dimensions:
         """Dimensions of the specimen in SI; a file is looked for in a folder."""

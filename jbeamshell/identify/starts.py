@@ -17,8 +17,7 @@ import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.models import StripModel
-from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.specimens import Specimen, plausible_stiffness
+from jbeamshell.identify.specimens import Case, plausible_stiffness
 from jbeamshell.measured.curves import Backbone, DissipationCurve, StiffnessCurve
 from jbeamshell.measured.findings import TOO_LARGE, TOO_SMALL, TOO_SOFT, TOO_STIFF, UNIT_ERROR
 from jbeamshell.measured.inspection import inspect
@@ -272,17 +271,16 @@ def doubt_of_strain(known: Mapping[str, Any], scene: Scene, found: Estimate | No
     ]
 
 
-def check_starts(specimens: Sequence[Specimen], parameters: Sequence[Parameter]) -> None:
+def check_starts(cases: Sequence[Case], free: Sequence[str]) -> None:
     """Raise `InputError` if a free number starts a strip so that a measured force slides it off.
 
     Parameters
     ----------
-    specimens : strips at the start, and what was measured on them
-    parameters : free numbers
+    cases : strips at the start, and what was measured on them
+    free : keys to fit
     """
-    free = {parameter.key for parameter in parameters}
-    for one in specimens:
-        scene, found = one.model.own, _peak(one.measurements)
+    for case in cases:
+        scene, found = case.model.own, _peak(case.measurements)
         if not isinstance(scene, Scene):
             continue
         rule = gross_slip_rule(scene.load, scene.member, scene.number, found)

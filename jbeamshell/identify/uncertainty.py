@@ -1,7 +1,7 @@
 """Uncertainty of a fit: covariance, intervals, and directions that the data do not fix.
 
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
-most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
+most parameters are logarithms.  Their ends are mapped to values.  Where the residuals
 are correlated, or more than measured noise, the model is wrong in some way: their variance is then
 that of the few independent points they are worth: what a wrong model leaves is smooth along a
 curve.  What the model's own grid may leave adds to it.
@@ -139,7 +139,7 @@ class Uncertainty(NamedTuple):
         """Sentences on pairs of positive parameters of which one product is known far better."""
         scale = self.space.slopes(self.point) / self._sizes(values)
         relative = self.quantile(level) ** 2 * self.covariance * np.outer(scale, scale)
-        free = [i for i in np.flatnonzero(~self.at_bound).tolist() if self.space.bijections[i].log]
+        free = [i for i in np.flatnonzero(~self.at_bound).tolist() if self.space.coordinates[i].log]
         sentences: dict[tuple[int, ...], str] = {}
         for i, j in itertools.combinations(free, 2):
             power = -relative[i, j] / relative[j, j]
@@ -191,8 +191,8 @@ class Uncertainty(NamedTuple):
 
     def _sizes(self, values: Vector) -> Vector:
         """Sizes (n,) for relative errors: the values, or their starts if these are larger."""
-        starts = np.array([bijection.start for bijection in self.space.bijections])
-        logs = np.array([bijection.log for bijection in self.space.bijections])
+        starts = np.array([one.start for one in self.space.coordinates])
+        logs = np.array([one.log for one in self.space.coordinates])
         sizes = np.where(logs, np.abs(values), np.maximum(np.abs(values), np.abs(starts)))
         return np.where(sizes > 0.0, sizes, 1.0)
 
@@ -208,30 +208,27 @@ def uncertainty_at(problem: Problem, point: Vector) -> Uncertainty:
     problem : least-squares problem
     point : (n,) minimum
     """
-    space, experiment, end = problem.space, problem.experiment, problem(point)
+    end, emphasis, relative = problem(point), problem.emphasis, problem.relative
     residual, jacobian = end.residual, end.jacobian  # priors are the last rows
-    emphasis, relative = experiment.emphasis, experiment.relative
-    values = space.values(point)
-    pairs = zip(space.bijections, values.tolist(), strict=True)
-    at_bound = np.array([bijection.bound_at(value) is not None for bijection, value in pairs])
+    at_bound = np.array([bound is not None for bound in problem.space.bounds_at(point)])
     free = np.ix_(~at_bound, ~at_bound)
     eigenvalues, vectors = np.linalg.eigh((jacobian.T @ jacobian)[free])
     priors = np.ones(residual.size - emphasis.size)
     factors = np.append(emphasis, priors)
     left = (residual / factors)[: relative.size]
-    independent = independent_points([left[own] for own in experiment.slices])
+    independent = independent_points([left[own] for own in problem.slices])
     total = float(np.sum((residual / factors) ** 2))
     rows = max(residual.size - point.size, 1)
     scatter = float(np.sqrt(total / rows))
     freedom: float | None = max(rows - (left.size - independent), min(rows, FEWEST))
     sigma = scatter * float(np.sqrt(left.size / independent))
-    if experiment.noisy:
+    if problem.noisy:
         explained = scatter**2 <= stats.chi2.ppf(ALARM, rows) / rows
         scatter = 1.0 if explained else scatter
         sigma = max(sigma, 1.0)
         if explained and independent == left.size:
             sigma, freedom = 1.0, None
-    sigma = float(np.hypot(sigma, experiment.model_error * np.sqrt(left.size / FEWEST)))
+    sigma = float(np.hypot(sigma, problem.model_error * np.sqrt(left.size / FEWEST)))
     # A model fitted to its own data leaves no noise to divide by.
     sigma, scatter = (max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, scatter))
     # A pseudo-inverse would give directions without influence no variance; theirs is that of the
@@ -246,7 +243,9 @@ def uncertainty_at(problem: Problem, point: Vector) -> Uncertainty:
         inner = jacobian.T @ (factors[:, None] ** 2 * jacobian)
         inverse = inverse @ inner @ inverse
     noise = max(scatter * float(np.sqrt(np.mean(relative**2))), np.finfo(float).tiny ** 0.25)
-    return Uncertainty(space, point, inverse, at_bound, sigma, scatter, freedom, noise, independent)
+    return Uncertainty(
+        problem.space, point, inverse, at_bound, sigma, scatter, freedom, noise, independent
+    )
 
 
 def _percent(part: float) -> str:

@@ -15,7 +15,6 @@ from jbeamshell.laws.bar import Bar as Bar
 from jbeamshell.laws.bouc_wen import BoucWen as BoucWen
 from jbeamshell.laws.dahl import Dahl as Dahl
 from jbeamshell.laws.iwan4 import Iwan4 as Iwan4
-from jbeamshell.laws.iwan4_fit import iwan4_through as iwan4_through
 from jbeamshell.laws.jang_barber import JangBarber as JangBarber
 from jbeamshell.laws.jenkins import Jenkins as Jenkins
 from jbeamshell.laws.law import Law as Law

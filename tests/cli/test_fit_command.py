@@ -10,7 +10,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell import laws
 from jbeamshell.cli import main
-from jbeamshell.identify import multistart
+from jbeamshell.identify import plan as fit_plan
 from jbeamshell.identify.plan import Plan
 from jbeamshell.measured.loop_files import read_loops
 from tests import rig
@@ -137,7 +137,7 @@ def test_data_of_another_law_end_with_code_3(cli, planted, monkeypatch):
 
 
 def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
-    monkeypatch.setattr(multistart, "MAX_ITERATIONS", 1)
+    monkeypatch.setattr(fit_plan, "MAX_ITERATIONS", 1)
     line = refused("fit", planted, *FIT, "--json", code=3)
     assert line.startswith("the fit has not converged after 1 iterations, at contact.friction = ")
 
@@ -192,9 +192,9 @@ class Asked(Exception):
 @pytest.fixture
 def asked(monkeypatch):
     def run(plan, **_):
-        (one,) = plan.specimens
+        (one,) = plan.cases
         start = {p.key: p.start for p in plan.free if p.start is not None}
-        raise Asked(one.data, one.scene.replace(start), [p.key for p in plan.free])
+        raise Asked(one.measurements, one.model.own.replace(start), [p.key for p in plan.free])
 
     monkeypatch.setattr(Plan, "run", run)
 

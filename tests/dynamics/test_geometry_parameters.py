@@ -24,9 +24,18 @@ def test_the_loops_of_a_joint_give_its_parameters():
     assert "chi = -0.39" in str(found)
 
 
+def test_the_parameters_of_the_model_itself_come_back():
+    found = four_parameters(LAW, width=2.0)
+    for key in LAW.table():
+        factor = 1.0 if key in ("iwan4.chi", "iwan4.beta") else 2.0
+        assert float(found.law.get(key)) == pytest.approx(factor * float(LAW.get(key)), rel=1e-4)
+
+
 def test_a_joint_without_gross_slip_has_no_parameters():
     with pytest.raises(jb.InputError, match=r"joint\.capacity = inf: has no gross slip"):
         four_parameters(Joint(U, np.tanh(U)))
+    with pytest.raises(jb.InputError, match=r"^stiffest = inf: must be a number, 500 or more"):
+        four_parameters(jb.laws.Bar(1.0, 0.02))
     with pytest.raises(jb.InputError, match="ends too far below gross slip"):
         four_parameters(Joint(U, np.tanh(U), capacity=50.0))
 

@@ -18,8 +18,8 @@ def noisy():
 
 def kept(*data, weights=()):
     """Measurements that count, and what is said."""
-    (specimen,), said = counted_once([Specimen(scene(), list(data), weights=weights)])
-    return list(specimen.data), said
+    (case,), said = counted_once([Specimen(weights=weights).case(scene(), data)])
+    return list(case.measurements), said
 
 
 def test_the_same_data_twice_have_the_errors_of_once():
@@ -49,8 +49,9 @@ def test_copies_with_fewer_points_or_in_other_units_count_once(noisy):
 
 def test_weights_stay_with_their_measurements(noisy):
     one, other = noisy
-    (specimen,), _ = counted_once([Specimen(scene(), [one, one, other], weights=(3.0, 3.0, 2.0))])
-    assert list(specimen.weights) == [3.0, 2.0]
+    weighted = Specimen(weights=(3.0, 3.0, 2.0)).case(scene(), [one, one, other])
+    (case,), _ = counted_once([weighted])
+    assert case.weights.tolist() == [3.0, 2.0]
 
 
 def test_a_cycle_that_is_repeated_point_by_point_counts_once(noisy):
@@ -76,7 +77,8 @@ def test_loops_that_a_law_makes_alike_are_no_copies(noisy):
 
 def test_copies_of_another_specimen_stay_and_are_told(noisy):
     one = noisy[0]
-    specimens, (told,) = counted_once([Specimen(scene(), one, "a"), Specimen(scene(), one, "b")])
-    assert [len(specimen.data) for specimen in specimens] == [1, 1]
+    pair = [Specimen(label=label).case(scene(), [one]) for label in ("a", "b")]
+    cases, (told,) = counted_once(pair)
+    assert [len(case.measurements) for case in cases] == [1, 1]
     assert "of b and" in told
     assert "errors of numbers that both share are too small" in told

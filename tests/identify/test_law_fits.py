@@ -127,7 +127,7 @@ def test_asymmetry_and_memory_that_a_law_lacks_are_doubts():
     (text,) = feature_doubts(dahl, views)
     assert "dahl forgets where: its minor loops do not close" in text
     assert feature_doubts(jenkins, views) == feature_doubts(strip, views) == []
-    assert text in inspected([Specimen(dahl, [nested])], [], unchecked=True)
+    assert text in inspected([Specimen().case(dahl, [nested])], [], unchecked=True)
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Loops with noise in both columns: turns and noise as planted, and fits without a bias."""
 
+import equinox as eqx
 import numpy as np
 import pytest
 
@@ -40,7 +41,7 @@ def fits():
             Specimen("mindlin", recording(seed, True, 1, 400), set={"load.control": "force"}),
             starts=1,
         )
-        for seed in range(20)
+        for seed in range(12)
     ]
 
 
@@ -48,7 +49,7 @@ def fits():
 @pytest.mark.parametrize("cycles", [1, 3])
 def test_turns_and_noise_are_those_that_were_planted(sine, cycles):
     off, noises = [], []
-    for seed in range(20):
+    for seed in range(12):
         (loop,) = steady_loops(recording(seed, sine, cycles), "displacement")
         errors = loop.errors_of("displacement")
         for i, truth in ((0, SIZE), (loop.middle, -SIZE)):
@@ -81,7 +82,7 @@ def test_a_fit_has_no_bias_and_its_intervals_hold(fits):
     inside = []
     for key, truth in {key: float(LAW.get(key)) for key in LAW.free()}.items():
         off = [(fit.values[key] - truth) / fit.errors[key] for fit in fits]
-        assert abs(np.mean(off)) < 0.7  # three standard errors of 20; it was 1.6
+        assert abs(np.mean(off)) < 0.87  # three standard errors of 12; it was 1.6
         inside += [low < truth < high for low, high in (fit.intervals[key] for fit in fits)]
     assert np.mean(inside) > 0.87
 
@@ -94,13 +95,19 @@ def test_a_fit_tells_both_noises_in_one_line(fits):
         assert 0.0 < np.max(high.displacement - low.displacement) < 0.1 * SIZE
 
 
+@eqx.filter_jit
+def answer(seen, model):
+    """Weighted distances from a model, its response, and whether it converged."""
+    return seen.residual(model, Newton())
+
+
 def test_points_of_the_model_have_no_distance_from_it():
     """Wherever noise of the drive moves them along the loop."""
     (loop,) = steady_loops(recording(1), "displacement")
     model = LawModel(LAW)
     seen = observe(loop, model)
-    column = np.asarray(seen.predict(model, Newton())[0])[np.asarray(seen.weight) > 0.0]
+    column = np.asarray(answer(seen, model)[1])[np.asarray(seen.weight) > 0.0]
     turns = [0, loop.middle - 1, column.size]
     moved = loop.but(force=np.insert(column, turns, loop.force[[0, loop.middle, -1]]))
-    rows, *_ = observe(moved, model).residual(model, Newton())
+    rows, *_ = answer(observe(moved, model), model)
     np.testing.assert_allclose(rows, 0.0, atol=1e-9)

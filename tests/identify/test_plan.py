@@ -71,10 +71,10 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
         """
     )
     plan = read_plan(folder / "plan.toml")
-    thin, other = plan.specimens
+    thin, other = plan.cases
     assert (thin.label, other.label) == ("thin", "2")
-    assert [specimen.scene.get("strip.length") for specimen in plan.specimens] == [3.0, 3.0]
-    assert thin.scene.get("strip.height_ratio") == 0.05
+    assert [case.model.get("strip.length") for case in plan.cases] == [3.0, 3.0]
+    assert thin.model.get("strip.height_ratio") == 0.05
     assert [p.key for p in plan.free] == ["contact.friction", "strip.height_ratio"]
     assert plan.free[0].prior == (0.2, 0.05)
     assert plan.free[1].each
@@ -83,8 +83,8 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
     (loop,) = other.measurements  # six cycles are one, in N and m, per width
     assert loop.cycles == 6
     assert np.max(loop.force) == pytest.approx(0.5, rel=0.03)
-    assert other.scene.load.control == "displacement"
-    assert other.scene.get("load.amplitude") == pytest.approx(1e-5, rel=0.01)
+    assert other.model.control == "displacement"
+    assert other.model.get("load.amplitude") == pytest.approx(1e-5, rel=0.01)
     assert any("mean of 6 of 6" in note for note in plan.notes)
     assert any("2: the displacement drives" in note for note in plan.notes)
 

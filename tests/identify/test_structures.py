@@ -15,8 +15,7 @@ from jbeamshell.measured import DampingCurve, ForcedCurve, FrequencyCurve, Squee
 
 SIZE = np.geomspace(0.02, 1.0, 16)
 FORCE = np.geomspace(0.02, 0.9, 12)
-MASS, STIFFNESS = np.diag([1.0, 0.5]), np.array([[3.0, -3.0], [-3.0, 4.0]])
-TRUTH = {"structure.limit": 1.2, "structure.spring": 2.0, "structure.damping_ratio": 0.004}
+TRUTH = {"structure.limit": 1.2, "structure.between": -3.0, "structure.damping_ratio": 0.004}
 
 
 def build(scene, numbers):
@@ -24,18 +23,17 @@ def build(scene, numbers):
     force = FORCE * numbers["limit"]
     joint = Joint(force + 0.4 * force**2 / numbers["limit"], force)
     joint = joint.in_series(numbers["spring"])
-    ratio = numbers["damping_ratio"]
-    return Structure(MASS, STIFFNESS, [Attachment(joint, 0)], damping_ratio=ratio)
+    ratio, between = numbers["damping_ratio"], numbers["between"]
+    stiffness = [[3.0, between], [between, 4.0]]  # a list of numbers, of which one is negative
+    return Structure(np.diag([1.0, 0.5]), stiffness, [Attachment(joint, 0)], damping_ratio=ratio)
 
 
-START = Assembly(
-    build, numbers={"limit": 1.0, "spring": 3.0, "damping_ratio": 0.002}, point=0, driven=1
-)
+NUMBERS = {"limit": 1.0, "spring": 2.0, "damping_ratio": 0.002, "between": -2.9}
+START = Assembly(build, numbers=NUMBERS, point=0, driven=1)
 
 
-def curves(model, random, noise=(1e-4, 0.02)):
-    """Frequency and damping of a model, with noise that they know."""
-    true = model.curve(SIZE)
+def curves(true, random, noise=(1e-4, 0.02)):
+    """Frequency and damping of a mode, with noise that they know."""
     frequency = true.frequency * (1.0 + noise[0] * random.standard_normal(16))
     damping = true.damping * (1.0 + noise[1] * random.standard_normal(16))
     return [
@@ -44,13 +42,11 @@ def curves(model, random, noise=(1e-4, 0.02)):
     ]
 
 
-def forced(model, random, noise=0.02):
+def forced(curve, shapes, random, noise=0.02):
     """Steady responses about the resonance, with noise of the force that they know.
 
     The force is that of x = |(K_n - omega^2 + i 2 zeta omega_n omega)^-1 phi f phi| of one mode.
     """
-    curve, _ = model.response(SIZE)
-    shapes = model.structure().modes(1).shapes
     omega = curve.omega * (1.0 + 0.02 * random.uniform(-1.0, 1.0, SIZE.size))
     q = SIZE / abs(shapes[0, 0])
     dynamic = curve.omega**2 - omega**2 + 2j * curve.damping * curve.omega * omega
@@ -90,36 +86,30 @@ def test_a_wider_strip_and_more_mass_are_what_they_say(monkeypatch):
     np.testing.assert_allclose(wide.displacements, narrow.displacements, rtol=1e-12)
 
 
-def test_planted_numbers_are_recovered_within_their_intervals():
-    model, random = START.replace(TRUTH), np.random.default_rng(0)
-    found = fit([*curves(model, random), forced(model, random)], START, list(TRUTH))
+def test_planted_numbers_are_recovered_with_honest_intervals():
+    """Errors of 12 fits of three numbers each are as large as the fits say."""
+    model, errors = START.replace(TRUTH), []
+    true, shapes = model.curve(SIZE), model.structure().modes(1).shapes
+    for seed in range(12):
+        random = np.random.default_rng(seed)
+        data = [*curves(true, random), forced(true, shapes, random)]
+        found = fit(data, START, list(TRUTH))
+        errors.append([(found.values[k] - v) / found.errors[k] for k, v in TRUTH.items()])
+    assert 0.75 < np.sqrt(np.mean(np.square(errors))) < 1.3
+    assert np.mean(np.abs(errors) < 1.96) > 0.88
     assert found.converged
-    for key, truth in TRUTH.items():
-        low, high = found.intervals[key]
-        assert low < truth < high
-        assert high - low < 0.1 * truth
+    for key, (low, high) in found.intervals.items():
+        assert high - low < 0.1 * abs(TRUTH[key])
     assert 0.7 < found.uncertainty.scatter < 1.3
     assert isinstance(found.scene, Assembly)
+    bounded = Parameter("structure.between", low=-3.5, high=-2.0)  # a negative number may have
+    limit, _, ratio = TRUTH
+    other = fit(data, START, [limit, bounded, ratio], starts=1)
+    for key, value in found.values.items():
+        assert other.values[key] == pytest.approx(value, rel=1e-4)
+    assert Parameter(limit).coordinate(25.0).log  # a positive one stays positive
     again = found.scene.curve(SIZE).damping
     np.testing.assert_allclose(again, found.model[1].damping, rtol=1e-6)
-
-
-def test_a_number_of_a_structure_may_be_negative_and_stand_in_a_list():
-    """Iwan's exponent is found, with bounds or without; a stiffness in lists of numbers too."""
-
-    def law(scene, numbers):
-        joint = jb.laws.Iwan4(2.0, 50.0, numbers["chi"], 0.3)
-        return Structure([[1.0]], [[numbers["k"]]], [Attachment(joint, 0)])
-
-    size = np.geomspace(0.002, 0.03, 8)
-    start = Assembly(law, numbers={"chi": -0.6, "k": 25.0}, point=0)
-    curve = start.replace({"structure.chi": -0.3, "structure.k": 20.0}).curve(size)
-    data = [FrequencyCurve(size, curve.frequency), DampingCurve(size, curve.damping)]
-    for chi in ("structure.chi", Parameter("structure.chi", low=-0.95, high=-0.05)):
-        found = fit(data, start, [chi, "structure.k"], starts=1)
-        assert found.values["structure.chi"] == pytest.approx(-0.3, rel=1e-6)
-        assert found.values["structure.k"] == pytest.approx(20.0, rel=1e-6)
-    assert Parameter("structure.k").bijection(25.0).log  # a positive one stays positive
 
 
 def test_a_builder_that_jax_cannot_trace_is_told_so():
@@ -140,7 +130,7 @@ def test_a_builder_that_jax_cannot_trace_is_told_so():
 
 def soft(scene, numbers):
     """One mass on a joint alone that softens much, whose secant is not its first harmonic."""
-    force = np.linspace(0.02, 0.9, 60) * numbers["limit"]
+    force = np.linspace(0.05, 0.9, 18) * numbers["limit"]
     joint = Joint(force + 4.0 * force**4 / numbers["limit"] ** 3, force)
     return Structure(np.eye(1), 0.01 * np.eye(1), [Attachment(joint, 0)], damping_ratio=0.004)
 
@@ -169,14 +159,14 @@ def test_a_fit_by_statics_says_how_far_it_may_be_off():
     )
     other = found(size, *true).values["structure.limit"]
     assert abs(other - 1.2) == pytest.approx(moved, rel=0.3)
-    small = size < first  # the fix
-    well = found(size[small], curve.frequency[small], curve.damping[small])
+    small = np.geomspace(0.1, 0.7 * first, 8)  # the fix
+    curve = start.replace({"structure.limit": 1.2}).response(small)[0]
+    well = found(small, curve.frequency, curve.damping)
     assert not [warning for warning in well.doubts if "statics" in warning]
 
 
 @pytest.mark.slow
-def test_a_strip_in_a_structure_is_recovered_with_honest_intervals():
-    """Errors of 24 fits of three numbers each are as large as the fits say."""
+def test_a_strip_in_a_structure_is_recovered():
     truth = {
         "contact.friction": 0.12,
         "structure.stiffness": 1.1,
@@ -185,20 +175,12 @@ def test_a_strip_in_a_structure_is_recovered_with_honest_intervals():
     scene = jb.Scene().replace({"model.section": "plane", "model.nodes": 17})
     stiffness = np.array([[1.0, -1.0], [-1.0, 1.5]]) * 1e5
     start = Assembly.of(scene, np.diag([1.0, 0.3]), stiffness, point=1, damping_ratio=1e-3)
-    true, size, errors = start.replace(truth), np.geomspace(1e-6, 1.5e-5, 24), []
-    curve = true.curve(size)
-    for seed in range(24):
-        random = np.random.default_rng(seed)
-        frequency = curve.frequency * (1.0 + 1e-3 * random.standard_normal(24))
-        damping = curve.damping * (1.0 + 0.03 * random.standard_normal(24))
-        data = [
-            FrequencyCurve(size, frequency, noise=1e-3 * frequency),
-            DampingCurve(size, damping, noise=0.03 * damping),
-        ]
-        found = fit(data, start, list(truth))
-        errors.append([(found.values[k] - v) / found.errors[k] for k, v in truth.items()])
-    assert 0.75 < np.sqrt(np.mean(np.square(errors))) < 1.3
-    assert np.mean(np.abs(errors) < 1.96) > 0.88
+    size = np.geomspace(1e-6, 1.5e-5, 8)
+    curve = start.replace(truth).curve(size)
+    data = [FrequencyCurve(size, curve.frequency), DampingCurve(size, curve.damping)]
+    found = fit(data, start, list(truth))
+    for key, value in truth.items():
+        assert found.values[key] == pytest.approx(value, rel=1e-4)
 
 
 def test_a_plan_names_the_structure(tmp_path):
@@ -211,10 +193,10 @@ def test_a_plan_names_the_structure(tmp_path):
         "specimen": [{"data": ["d.csv"], "kind": "damping"}],
     }
     plan = plan_from_values(values, tmp_path)
-    (specimen,) = plan.specimens
-    assert float(specimen.scene.get("structure.damping_ratio")) == 0.01
-    assert specimen.scene.point == 0
-    assert specimen.measurements[0].amplitude.tolist() == [1e-6, 2e-6, 3e-6]
+    (case,) = plan.cases
+    assert float(case.model.get("structure.damping_ratio")) == 0.01
+    assert case.model.point == 0
+    assert case.measurements[0].amplitude.tolist() == [1e-6, 2e-6, 3e-6]
     with pytest.raises(jb.InputError, match="structure: 'masses' is unknown"):
         plan_from_values(values | {"structure": {"masses": 1.0}}, tmp_path)
     with pytest.raises(jb.InputError, match="free"):

@@ -12,6 +12,7 @@ from jbeamshell.identify.doubts import doubt_of_units
 from jbeamshell.identify.observations import run_of
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.search_space import search_space
+from jbeamshell.identify.specimens import Specimen
 
 STIFF, MU = "strip.axial_stiffness", "contact.friction"
 TRUE = 2.0e4
@@ -63,7 +64,7 @@ def test_a_bound_that_a_wrong_unit_meets_says_so():
 def test_friction_that_no_surface_has_is_said_unless_the_stiffness_tells_more():
     strip = scene()
     keys = [Parameter(MU), Parameter(STIFF)]
-    space, _ = search_space(keys, {"": strip})
+    space, _ = search_space(keys, [Specimen().case(strip, [])])
     stiffness = float(strip.get(STIFF))
     assert doubt_of_units(space, [0.2, stiffness]) == []
     (both,) = doubt_of_units(space, [200.0, stiffness])

@@ -326,7 +326,7 @@ def test_plans_turn_signs_and_take_data_unchecked(csv, tmp_path):
     (tmp_path / "plan.toml").write_text(f"unchecked = true\n{text}", "utf-8")
     plan = jb.identify.read_plan(tmp_path / "plan.toml")
     assert plan.options.unchecked
-    (one,), (other,) = turned.specimens[0].data, plan.specimens[0].data
+    (one,), (other,) = turned.cases[0].measurements, plan.cases[0].measurements
     assert one.work == pytest.approx(-other.work)
 
 

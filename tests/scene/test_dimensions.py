@@ -121,9 +121,9 @@ def test_a_plan_and_the_command_take_dimensions(tmp_path, capsys):
         text = f"[free.'contact.friction']\n[[specimen]]\ndata=['rig.csv']\ndimensions = {entry}\n"
         (tmp_path / "plan.toml").write_text(text, "utf-8")
         plan = jb.identify.read_plan(tmp_path / "plan.toml")
-        (specimen,) = plan.specimens
-        assert float(specimen.scene.strip.length) == pytest.approx(0.12)
-        (loop,) = specimen.data
+        (case,) = plan.cases
+        assert float(case.model.own.strip.length) == pytest.approx(0.12)
+        (loop,) = case.measurements
         assert np.max(loop.force) == pytest.approx(4e3 / 0.05, rel=0.01)
         assert loop.units["force"] == "N/m"
         assert any("head of 9 mm" in note for note in plan.notes)

@@ -13,7 +13,7 @@ from damaged import BLOCK, saved_runs
 
 import jbeamshell as jb
 from jbeamshell.common import files
-from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.runs import Evaluation
 from jbeamshell.sweeping.store import Store
 
 EVIL = Path("evil")  # what unpickling would make
