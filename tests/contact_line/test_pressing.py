@@ -128,3 +128,8 @@ class TestReceding:
         assert np.ptp(history.contact_end[1:]) > 0.2  # friction moves the end of the contact
         assert abs(float(history.closure)) < 1e-5  # a node that slips by a part settles slowly
         assert float(history.dissipation_loop / history.dissipation) == pytest.approx(1.0, abs=1e-3)
+        worst = np.max(np.abs(history.energy_imbalance))
+        assert worst < 3e-3 * np.sum(history.slip_work)  # of the trapezoid of F du
+        opened = ~np.asarray(history.touching)
+        assert np.any(opened & (history.x < 50.9))
+        np.testing.assert_allclose(history.traction[opened], 0.0, atol=1e-3)
