@@ -11,7 +11,7 @@ from toy import STRIP
 import jbeamshell as jb
 
 # On the contact line, exact in time: two steps per half cycle say where the path is looked at.
-FEW = {"model.nodes": 33, "load.cycles": 1, "load.steps_per_half_cycle": 2}
+FEW = {"model.nodes": 65, "load.steps_per_half_cycle": 2}
 PLANE = jb.Scene().replace(FEW | {"model.section": "plane"})
 SQUEEZE = jb.Scene().replace(FEW | {"model.section": "squeeze", "model.kinematics": "linear"})
 

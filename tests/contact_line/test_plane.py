@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from nested_zones import nested
+from scenes import FEW
 from toy import plane_strip, rows_of
 
 import jbeamshell as jb
@@ -36,15 +37,26 @@ def two_layers():
     return Material(thickness, stiffness, 0.4 * stiffness, 0.3 * stiffness)
 
 
+LAYERS = jax.jit(lambda: layered_form(two_layers()))
+
+
+@jax.jit
+def eliminated(x, loads, given):
+    """Elimination of two layers, its stations' stiffness, and inner fields of what is given."""
+    form = layered_form(two_layers())
+    far, loaded = end_section(form, "held"), end_section(form)
+    ((elimination, found),) = strip.eliminate(form, x, loads[:, None], far, loaded)
+    return form.element(jnp.diff(x)), found, elimination.recovered(given)
+
+
 class TestSection:
     def test_rigid_motions_and_unit_strains_have_the_energy_of_the_plane(self):
-        material = two_layers()
-        form = layered_form(material)
+        material, form = two_layers(), jax.tree.map(np.asarray, LAYERS())
         # Translations along X and across, which no strain belongs to.
         for mode in form.modes[:2, 1]:
             np.testing.assert_allclose(form.values @ mode, 0.0, atol=1e-8)
             np.testing.assert_allclose(form.mixed.T @ mode, 0.0, atol=1e-12)
-        h, c, lam, g = material
+        h, c, lam, g = map(np.asarray, material)
         s = np.cumsum(h) - 0.5
         inertia = ((s**3) - (s - h) ** 3) / 3.0
         exact = [h @ c, h @ g, inertia @ c, h @ c, inertia @ g]
@@ -55,7 +67,7 @@ class TestSection:
         np.testing.assert_allclose(squeeze @ form.mixed @ stretch, h @ lam, rtol=1e-12)
 
     def test_means_find_rotation_and_squeeze(self):
-        form = layered_form(two_layers())
+        form = jax.tree.map(np.asarray, LAYERS())
         np.testing.assert_allclose(form.further @ form.modes[2, 1], [1.0, 0.0], atol=1e-12)
         np.testing.assert_allclose(form.further @ form.modes[3, 0], [0.0, 1.0], atol=1e-12)
         np.testing.assert_allclose(form.pull @ form.modes[0, 1], 1.0, rtol=1e-12)
@@ -63,9 +75,10 @@ class TestSection:
 
 class TestBody:
     def test_elimination_is_that_of_the_whole_matrix(self):
-        form, x = layered_form(two_layers()), jnp.array([0.0, 1.0, 1.7, 2.0])
-        loads, n, m = jnp.array([0.3, 0.8, 0.5, 0.2]), 4, form.pull.size
-        start, end, across = (np.asarray(part) for part in form.element(jnp.diff(x)))
+        form, x = jax.tree.map(np.asarray, LAYERS()), np.array([0.0, 1.0, 1.7, 2.0])
+        loads, n, m = np.array([0.3, 0.8, 0.5, 0.2]), 4, form.pull.size
+        given = np.random.default_rng(0).normal(size=(2 * n + 2, 3))
+        (start, end, across), found, inner = jax.tree.map(np.asarray, eliminated(x, loads, given))
         whole = np.zeros((n * m + 2, n * m + 2))
         for i in range(n - 1):
             a, b = slice(i * m, i * m + m), slice(i * m + m, i * m + 2 * m)
@@ -81,13 +94,9 @@ class TestBody:
         gone = [i for i in range(n * m) if i not in kept and i not in held]
         known = np.linalg.solve(whole[np.ix_(gone, gone)], whole[np.ix_(gone, kept)])
         schur = whole[np.ix_(kept, kept)] - whole[np.ix_(kept, gone)] @ known
-        far, loaded = end_section(form, "held"), end_section(form)
-        ((elimination, found),) = strip.eliminate(form, x, loads[:, None], far, loaded)
         np.testing.assert_allclose(found, schur, atol=1e-10 * np.abs(schur[:8, :8]).max())
-        given = np.random.default_rng(0).normal(size=(2 * n + 2, 3))
         recovered = np.zeros((n * m, 3))
         recovered[gone] = -known @ given
-        inner = np.asarray(elimination.recovered(jnp.asarray(given)))
         np.testing.assert_allclose(inner, recovered.reshape(n, m, 3)[:, 2:], atol=1e-7)
 
     def test_a_uniform_pressure_squeezes_uniformly(self):

@@ -318,15 +318,6 @@ def test_a_doubt_about_chosen_nodes_names_the_tolerance():
     assert "more model.nodes" in given.doubts[0]
 
 
-def test_pressures_that_change_beside_elastic_sliders_take_load_steps():
-    path = np.array([[0.2, 1.0], [0.2, 0.5]])
-    soft = jb.Scene().replace({"model.nodes": 11, "contact.stick_stiffness": 10.0})
-    history = jb.solve(soft, path, throw=False)
-    assert history.scene.plan.engine == STEPS
-    with pytest.raises(jb.InputError, match="must act wholly beside elastic sliders"):
-        jb.solve(soft.replace({"model.section": "plane"}), path)
-
-
 def test_a_plan_does_not_depend_on_the_plan_before():
     little = {"strip.height_ratio": 0.3, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
     before = [jb.Scene().replace(values) for values in ({}, {"strip.kappa_s": 0.5})]

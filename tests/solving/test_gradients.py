@@ -13,7 +13,7 @@ from jbeamshell.mechanics.friction import ElasticSlip
 LAP = {"strip.far_end": "free", "member.support": "rolling"}
 EXACT = {"model.section": "squeeze", "model.kinematics": "exact"}
 SCENES = {
-    "plane": PLANE,
+    "plane": PLANE.replace({"strip.overhang": 0.15}),
     "lap joint with elastic sliders that is moved": SQUEEZE.replace(
         LAP
         | {
