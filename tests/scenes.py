@@ -19,7 +19,7 @@ SQUEEZE = jb.Scene().replace(FEW | {"model.section": "squeeze", "model.kinematic
 STEPS = 20  # loads of a path
 EVEN = [[0.0, 10.0], [0.9, 10.0], [0.9, 10.0], [2.0, 10.0]]
 UNEVEN = [[0.0, 8.0], [0.9, 12.0], [0.9, 9.0], [2.0, 11.0]]  # the same shape
-STEPPED = STRIP.replace(
+OPEN = STRIP.replace(
     {
         "contact.pressure": EVEN,
         "model.nodes": 41,
@@ -29,8 +29,9 @@ STEPPED = STRIP.replace(
         "load.cycles": 1,
     }
 )
-EXACT = STEPPED.replace({"model.kinematics": "exact"})
-HELD = STEPPED.replace({"contact.normal": "held", "model.section": "shell"})
+EXACT = OPEN.replace({"model.kinematics": "exact"})
+STEPPED = OPEN.pinned()  # names its section, as a scene of a file does
+HELD = OPEN.replace({"contact.normal": "held", "model.section": "shell"})
 MOVED = STEPPED.replace({"load.control": "displacement", "load.amplitude": 2e-5})
 
 

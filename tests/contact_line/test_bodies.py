@@ -174,7 +174,11 @@ class TestHistory:
         np.testing.assert_array_equal(again.fields, exact.fields)
 
     def test_a_strip_that_lifts_while_its_end_is_moved(self):
-        lifting = {"strip.height_ratio": 0.4, "contact.friction": 0.4, "contact.stick_stiffness": 50.0}
+        lifting = {
+            "strip.height_ratio": 0.4,
+            "contact.friction": 0.4,
+            "contact.stick_stiffness": 50.0,
+        }
         scene = MOVED.replace(lifting)
         path = 5e-5 * np.append(np.arange(1, 5) / 4.0, 1.0 - np.arange(1, STEPS - 3) / 8.0)
         steps = jb.solve(scene, path, throw=False)

@@ -89,7 +89,8 @@ class TestBeyond:
         scene = PLANE.replace({"load.amplitude": 0.2})
         whole = float(jb.solve(scene, throw=False).dissipation)
         parts = [
-            float(jb.solve(scene.replace({"strip.overhang": n * H}), throw=False).dissipation) / whole
+            float(jb.solve(scene.replace({"strip.overhang": n * H}), throw=False).dissipation)
+            / whole
             for n in (0.5, 1.0, 2.0, 16.0)
         ]
         assert np.all(np.diff(parts) > 0.0)

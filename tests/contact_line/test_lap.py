@@ -244,7 +244,8 @@ def moments(amplitude, **values):
 
 class TestMoments:
     @pytest.mark.parametrize(
-        "section", ["squeeze", *(pytest.param(n, marks=pytest.mark.slow) for n in ("shell", "plane"))]
+        "section",
+        ["squeeze", *(pytest.param(n, marks=pytest.mark.slow) for n in ("shell", "plane"))],
     )
     def test_an_arm_adds_the_rotation_of_the_end(self, section):
         scene = library.single_lap().replace({"model.section": section, "model.nodes": 25})

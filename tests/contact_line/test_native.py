@@ -163,9 +163,9 @@ def test_a_batch_is_its_lanes():
     frictions, loads = jnp.asarray(frictions), jnp.asarray(sizes)[:, None] * LOADS
     closed = jnp.zeros((4, NODES))
     many = jax.jit(jax.vmap(lambda *at: mixed(*at, True)))(stacked, frictions, loads, closed)
-    shared = jax.jit(
-        jax.vmap(lambda load: mixed(bodies[0], frictions[0], load, closed[0], True))
-    )(loads)
+    shared = jax.jit(jax.vmap(lambda load: mixed(bodies[0], frictions[0], load, closed[0], True)))(
+        loads
+    )
     one = jax.jit(lambda *at: mixed(*at, True))
     slopes = jax.jit(jax.vmap(jax.grad(lambda *at: mixed(*at, True), argnums=1)))
     of_many = slopes(stacked, frictions, loads, closed)

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from nested_zones import nested
-from scenes import FEW
 from toy import plane_strip, rows_of
 
 import jbeamshell as jb

@@ -157,7 +157,7 @@ def test_a_strip_that_is_held_down_does_not_lift():
     assert "held down in load steps" in str(held.plan)
 
 
-@pytest.mark.doubtful("the section squeeze")
+@pytest.mark.slow
 def test_load_steps_lift_as_the_contact_line_does():
     """Kept down, this strip would dissipate 5 % less, and as much with sliders of alpha G/H."""
     thick = {"strip.height_ratio": 0.35, "contact.friction": 0.4, "load.amplitude": 2.0}
@@ -378,9 +378,9 @@ def test_a_pinned_scene_keeps_its_plan(scene, tmp_path_factory):
 
 @pytest.mark.parametrize(
     "section",
-    ["shell", pytest.param("squeeze", marks=pytest.mark.slow)],
+    ["shell", "squeeze"],
 )
-@pytest.mark.doubtful("the section")
+@pytest.mark.slow
 def test_load_steps_dissipate_as_the_contact_line_does(section):
     """The two engines share the section and the base, not the grid nor the solver."""
     scene = jb.Scene().replace({"model.section": section, "model.kinematics": "linear"})

@@ -38,7 +38,8 @@ def dissipation(scene):
 
 
 @pytest.mark.parametrize(
-    "name", ORDINARY + [pytest.param(n, marks=pytest.mark.slow) for n in SCENES if n not in ORDINARY]
+    "name",
+    ORDINARY + [pytest.param(n, marks=pytest.mark.slow) for n in SCENES if n not in ORDINARY],
 )
 def test_whole_scenes_may_be_compiled_stacked_and_differentiated(name):
     """Lanes are the scenes alone, and the slope over all numbers is that of the Taylor test."""
@@ -47,7 +48,9 @@ def test_whole_scenes_may_be_compiled_stacked_and_differentiated(name):
     parts = np.random.default_rng(0).uniform(-1.0, 1.0, len(leaves))
 
     def moved(step):
-        numbers = [np.asarray(leaf) * (1.0 + step * p) for leaf, p in zip(leaves, parts, strict=True)]
+        numbers = [
+            np.asarray(leaf) * (1.0 + step * p) for leaf, p in zip(leaves, parts, strict=True)
+        ]
         return jax.tree.unflatten(tree, numbers)
 
     # Small enough that no node changes between sticking and slipping on the way.
@@ -102,7 +105,10 @@ def test_forward_and_reverse_agree_and_batches_equal_loops():
         direction[i] = AT[i]
         sizes = np.array([4e-4, 2e-4, 1e-4, 5e-5])
         value = sharp(AT)[0]
-        rest = [abs(float(sharp(AT + h * direction)[0] - value - h * reverse @ direction)) for h in sizes]
+        rest = [
+            abs(float(sharp(AT + h * direction)[0] - value - h * reverse @ direction))
+            for h in sizes
+        ]
         slope = np.polyfit(np.log(sizes), np.log(rest), 1)[0]
         assert slope == pytest.approx(2.0, abs=0.1), KEYS[i]
 

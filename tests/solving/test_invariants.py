@@ -168,7 +168,10 @@ def test_the_loop_scales_with_all_forces_all_lengths_and_the_stiffness(values, f
         2.0 / length * other.displacement, one.displacement, atol=1e-7 * width
     )
     np.testing.assert_allclose(
-        2.0 / (force * length) * other.dissipation, one.dissipation, rtol=1e-6, atol=1e-9 * size(one)
+        2.0 / (force * length) * other.dissipation,
+        one.dissipation,
+        rtol=1e-6,
+        atol=1e-9 * size(one),
     )
     reach = PRESSURE * values["contact.friction"]
     np.testing.assert_allclose(length / force * other.traction, one.traction, atol=1e-6 * reach)

@@ -167,8 +167,14 @@ def test_single_precision_says_what_it_cannot_do():
 
 @pytest.mark.parametrize(
     ("path", "told"),
-    [([], "path"), ([[0.1]], "path"), ([0.1, np.nan], "path"), ([0.1, np.inf], "path")]
-    + [([1.0, 2.0], "gross slip"), (None, r"load.amplitude = 2.5.*'displacement'")],
+    [
+        ([], "path"),
+        ([[0.1]], "path"),
+        ([0.1, np.nan], "path"),
+        ([0.1, np.inf], "path"),
+        ([1.0, 2.0], "gross slip"),
+        (None, r"load.amplitude = 2.5.*'displacement'"),
+    ],
 )
 def test_paths_that_are_none(path, told):
     with pytest.raises(jb.InputError, match=told):
