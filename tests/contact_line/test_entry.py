@@ -203,29 +203,6 @@ class TestDisplacement:
         )
 
 
-class TestDerivatives:
-    @pytest.mark.slow
-    @pytest.mark.parametrize("name", ENTRIES)
-    def test_taylor_slope_is_two(self, name):
-        """What a first-order step leaves of all figures falls with the square of the step."""
-        scene = PLANE.replace({"load.entry": name, "model.nodes": 17, "load.amplitude": 0.6})
-        ask = jb.response(scene, NUMBERS, FIGURES)
-        at = jnp.asarray([H, 0.1, 0.6])
-        way = jnp.asarray([0.3 * H, -0.02, 0.1])
-
-        @jax.jit
-        def figures(step):
-            found = ask(*(at + step * way))
-            return jnp.stack([found[figure] for figure in FIGURES])
-
-        value, slope = jax.jvp(figures, (jnp.zeros(()),), (jnp.ones(()),))
-        steps = np.array([1e-3, 1e-4])
-        left = np.array([figures(step) - value - step * slope for step in steps]) / value
-        small = np.abs(left) < 1e-12
-        falls = np.log10(np.abs(left[0]) / np.maximum(np.abs(left[1]), 1e-300))
-        assert np.all(small[1] | (np.abs(falls - 2.0) < 0.2)), (left, falls)
-
-
 def test_one_state_serves_where_the_ends_are_the_same():
     assert entry.states(PLANE) == (False, True)
     assert entry.states(PLANE.replace({"load.entry": "face"})) == (True,)

@@ -372,40 +372,9 @@ def test_a_saved_joint_is_read_again(tmp_path):
     assert again.figures() == history.figures()
 
 
-@pytest.mark.slow
-def test_derivatives_have_slope_two():
-    keys = ("strip.height_ratio", "member.height_ratio", "contact.friction")
-    scene = SQUEEZE.replace({"member.height_ratio": 0.12}).pinned()
-
-    def work(numbers):
-        return jb.solve(scene.replace(dict(zip(keys, numbers, strict=True)))).dissipation
-
-    at, way = jnp.array([0.11, 0.12, 0.1]), jnp.array([0.1, -0.1, 0.05])
-    along = jax.jit(lambda x: jax.jvp(work, (x,), (way,)))
-    value, slope = along(at)
-    errors = [abs(along(at + h * way)[0] - value - h * slope) for h in (4e-4, 2e-4)]
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
-
-
 def test_plane_members_are_computed_in_double_precision():
     expected = float(jb.solve(library.double_shear().replace(FEW)).dissipation)
     with jax.enable_x64(False):
         found = jb.solve(library.double_shear().replace(FEW))
     assert found.force.dtype == np.float32
     assert float(found.dissipation) == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_planted_height_and_friction_are_found():
-    true = SQUEEZE.replace({"member.height_ratio": 0.15})
-    random, loops = np.random.default_rng(0), []
-    for amplitude in (1.0, 1.5):
-        force, u = map(np.asarray, jb.solve(true.replace({"load.amplitude": amplitude})).loop)
-        noise = 2e-3 * np.ptp(u) * random.normal(size=u.size)
-        loops.append(jb.measured.Loop(force, u + noise, label=f"A = {amplitude}"))
-    start = true.replace({"member.height_ratio": 0.11, "contact.friction": 0.12})
-    free = ["member.height_ratio", "contact.friction"]
-    fit = jb.identify.fit(loops, start, free)
-    for key, value in zip(free, (0.15, 0.1), strict=True):
-        assert fit.values[key] == pytest.approx(value, abs=3.0 * fit.errors[key])
-        assert fit.errors[key] < 0.01 * value

@@ -197,14 +197,6 @@ class TestHistory:
         imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
         assert imbalance < 0.01  # trapezoids of the work over 40 steps a branch
 
-    @pytest.mark.slow
-    def test_load_steps_only_say_where_the_path_is_looked_at(self):
-        few, many = ({"load.steps_per_half_cycle": count} for count in (2, 40))
-        scene = plane_strip(0.1126, 0.3)
-        one, other = (plane(scene, **steps) for steps in (few, many))
-        assert float(one.dissipation) == pytest.approx(float(other.dissipation), rel=1e-10)
-        np.testing.assert_allclose(one.slip[-1], other.slip[-1], atol=1e-12 * one.slip.max())
-
     def test_it_stands_beside_the_beamshell(self):
         scene = plane_strip(0.0511)
         elastic, shell = plane(scene), jb.solve(scene)
@@ -222,18 +214,6 @@ class TestHistory:
 
 
 class TestScene:
-    @pytest.mark.slow
-    def test_a_response_is_what_a_run_says(self):
-        scene = plane_strip(0.1126).replace({"model.section": "plane", "model.nodes": 33})
-        one_step = scene.replace({"load.steps_per_half_cycle": 1})
-        ask = jb.response(one_step, ["contact.friction", "load.amplitude"], ["dissipation"])
-        for mu, amplitude in ((0.1, 1.0), (0.5, 3.0)):  # nested, and walked event by event
-            numbers = {"contact.friction": mu, "load.amplitude": amplitude}
-            run = jb.solve(one_step.replace(numbers))
-            found = ask(mu, amplitude)
-            assert int(found["status"]) == 0
-            np.testing.assert_allclose(found["dissipation"], run.dissipation, rtol=1e-10)
-
     @pytest.mark.doubtful("few nodes")
     def test_a_history_is_read_as_it_was_written(self, tmp_path):
         history = plane(plane_strip(0.1126), **{"model.nodes": 33, "load.steps_per_half_cycle": 1})
@@ -250,51 +230,3 @@ class TestScene:
         assert np.all(table.status == 0)
         alone = plane(scene, **{"model.nodes": 33, "contact.friction": 0.5}).dissipation
         np.testing.assert_allclose(table["dissipation"][1], alone, rtol=1e-10)
-
-    @pytest.mark.slow
-    def test_displacement_control_walks_the_loop_of_the_force_and_goes_beyond(self):
-        few = {"model.nodes": 33, "load.steps_per_half_cycle": 2}
-        force = plane(plane_strip(0.1126), **few)
-        control = {"load.control": "displacement", "load.amplitude": force.displacement[1]}
-        driven = plane_strip(0.1126).replace({"model.section": "plane"} | few | control)
-        moved = jb.solve(driven, force.displacement[1:])
-        # Corners are rounded over displacements here and over forces there, on 33 nodes.
-        np.testing.assert_allclose(moved.force, force.force, atol=2e-4)
-        np.testing.assert_allclose(moved.target, moved.displacement, rtol=1e-12)
-        loose = {"load.amplitude": 1e-3, "strip.far_end": "free"}  # nothing but friction holds it
-        beyond = plane(plane_strip(0.1126), **few, **control | loose)
-        np.testing.assert_allclose(beyond.force[1], 2.0, rtol=1e-8)  # mu F_N L
-
-    @pytest.mark.slow
-    def test_soft_sliders_make_the_strip_softer_and_keep_its_energy(self):
-        few = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
-        ideal, soft = (
-            plane(plane_strip(0.1126), **few, **{"contact.stick_stiffness": alpha})
-            for alpha in (None, 0.3)
-        )
-        assert float(soft.secant_stiffness) < 0.95 * float(ideal.secant_stiffness)
-        for history in (ideal, soft):
-            imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
-            assert imbalance < 0.05  # trapezoids of the work over 8 steps a branch
-
-    @pytest.mark.slow
-    def test_a_traced_path_is_the_path(self):
-        scene = plane_strip(0.1126).replace({"model.section": "plane", "model.nodes": 17})
-        loads = np.array([0.5, 1.0, 0.4, -0.3, -0.8, -0.8, 0.1, 1.0])
-        run = jb.solve(scene, loads)
-        traced = jax.jit(lambda path: jb.solve(scene, path, throw=False))(loads)
-        assert not np.any(traced.status)
-        for name in ("displacement", "slip_work", "traction"):
-            known = getattr(run, name)
-            close = 1e-9 * np.abs(known).max()
-            np.testing.assert_allclose(getattr(traced, name), known, atol=close)
-
-    @pytest.mark.slow
-    def test_a_fit_finds_planted_parameters(self):
-        few = {"model.section": "plane", "model.nodes": 49, "load.steps_per_half_cycle": 10}
-        scene = jb.Scene().replace(few)
-        planted = {"contact.friction": 0.12, "strip.height_ratio": 0.09}
-        loop = jb.measured.make_loop(*map(np.asarray, jb.solve(scene.replace(planted)).loop))
-        found = jb.identify.fit(loop, scene, list(planted))
-        for key, value in planted.items():
-            assert found.values[key] == pytest.approx(value, rel=2e-3)

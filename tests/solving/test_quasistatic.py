@@ -35,18 +35,6 @@ def test_bar_limit_gives_backbone_and_cubic_law(settings, error):
     np.testing.assert_allclose(history.displacement[1 : start + 1], backbone, atol=close)
 
 
-@pytest.mark.slow
-def test_steps_do_not_matter():
-    base = STRIP.replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
-    dissipation = [
-        float(jb.solve(base.replace({"load.steps_per_half_cycle": n})).dissipation)
-        for n in (20, 40, 160)
-    ]
-    error = np.abs(np.array(dissipation) / dissipation[-1] - 1.0)
-    assert error[0] < 5e-3
-    assert error[1] < 2e-3
-
-
 SMOOTHED = pytest.param(16.0, 1e-4, marks=pytest.mark.slow)
 
 

@@ -4,7 +4,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.scene import library
@@ -158,45 +157,3 @@ def test_the_assumed_squeeze_strain_is_what_it_says():
     np.testing.assert_allclose(history.psi[0][inner], assumed[inner], atol=1e-9)
     assert 2.5 < float(history.contact_end[0]) < 2.52
     assert 1010.0 < float(history.reaction_max[0]) < 1040.0  # rises before the load falls
-
-
-@pytest.fixture(scope="module", params=[{}, {"contact.friction": 0.5, "load.amplitude": 1500.0}])
-def clamped(request):
-    return jb.solve(library.receding_rough().replace(request.param))
-
-
-@pytest.mark.slow
-def test_friction_and_lift_balance_their_energy(clamped):
-    assert float(clamped.dissipation_loop) == pytest.approx(float(clamped.dissipation), rel=1e-3)
-    assert abs(float(clamped.closure)) < 1e-6
-    assert float(jnp.min(clamped.slip_work)) > -1e-12
-    worst = float(jnp.max(jnp.abs(clamped.energy_imbalance)))
-    assert worst < 3e-3 * float(jnp.sum(clamped.slip_work))  # of the trapezoid of F du
-
-
-@pytest.mark.slow
-def test_an_open_contact_forgets_its_traction(clamped):
-    mu = clamped.scene.contact.friction
-    open_ = ~clamped.touching
-    assert bool(jnp.any(open_ & (clamped.x < 50.9)))
-    assert float(jnp.max(jnp.abs(jnp.where(open_, clamped.traction, 0.0)))) < 1e-3
-    cap = jnp.maximum(mu * clamped.reaction, 1e-3)
-    # A node that opens or closes within a rounded corner has a little more than its friction.
-    assert float(jnp.max(jnp.abs(clamped.traction) / cap)) < 1.0 + 1e-3
-    ends = np.asarray(clamped.contact_end[1:])
-    assert np.ptp(ends) > 0.1  # it recedes and advances along the cycle
-
-
-@pytest.mark.slow
-def test_a_unilateral_end_does_not_mind_how_fine_it_is():
-    """With the lift frozen the corner goes into tension, and D drifts with the end element."""
-    thick = {"model.section": "squeeze", "load.amplitude": 0.3247}
-    sizes = {12: 68, 24: 75, 96: 91}  # H over the end element, and nodes with all others alike
-    dissipation = []
-    for parts, nodes in sizes.items():
-        scene = STRIP.replace(LINEAR | thick | {"load.cycles": 1})
-        history = jb.solve(scene.on_grid(nodes, 1.0 / parts))
-        assert float(history.reaction_min) > -1e-6
-        dissipation.append(float(history.dissipation))
-    assert abs(dissipation[0] / dissipation[1] - 1.0) < 6e-3
-    assert abs(dissipation[1] / dissipation[2] - 1.0) < 5e-3
