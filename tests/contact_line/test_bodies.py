@@ -3,10 +3,12 @@
 import sys
 from functools import partial
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scenes import MOVED, STEPS
 
 import jbeamshell as jb
 from jbeamshell.contact_line import strip, walk
@@ -21,6 +23,19 @@ LAYERS = [[0.1, 2.0e4, 0.3], [0.1252, 1.5e5, 0.2]]
 AMPLITUDE = float(SCENE.load.amplitude)
 SOFT = {"contact.stick_stiffness": 50.0}  # load steps have no ideal friction
 condensed = jax.jit(lambda scene: strip.condensed(scene, scene.plan.nodes))
+
+
+@eqx.filter_jit
+def derivatives(scene, q):
+    """Second derivatives of the energy, first ones of u(L) and of the sinking, and the nodes."""
+    elastic, system = ElasticStrip(scene), System(scene)
+    conjugates = jax.grad(system.end_displacement)(q), jax.grad(elastic.sinking)(q)
+    return jax.hessian(elastic.strain_energy)(q), *conjugates, elastic.x
+
+
+@eqx.filter_jit
+def system_of(scene):
+    return System(scene)
 
 
 def built_in(e, g, k, psi, dpsi):
@@ -63,23 +78,22 @@ BODIES = {
 
 
 class TestBody:
-    @pytest.mark.parametrize("name", BODIES)
+    @pytest.mark.parametrize(
+        "name",
+        [
+            pytest.param(n, marks=[pytest.mark.slow] if n in ("plane stress", "printed") else [])
+            for n in BODIES
+        ],
+    )
     def test_it_is_the_strip_of_the_load_steps_without_its_inner_fields(self, name):
         """Elimination station by station is that of the whole potential's second derivatives."""
         scene = BODIES[name].replace({"model.nodes": 5})
-        elastic = ElasticStrip(scene)
-        zero = jnp.zeros((5, 4))
+        zero = np.zeros((5, 4))
         free = np.zeros(zero.shape, bool)
         free[:, list(scene.plan.active)] = True
-        for (node, field), _ in System(scene).supports(True).items():
+        for (node, field), _ in system_of(scene).supports(True).items():
             free[node, field] &= field in (0, 1)  # the contact's own are held later
-
-        @jax.jit
-        def derivatives(q):
-            conjugates = jax.grad(System(scene).end_displacement)(q), jax.grad(elastic.sinking)(q)
-            return jax.hessian(elastic.strain_energy)(q), *conjugates
-
-        matrix, pull, press = map(np.asarray, derivatives(zero))
+        matrix, pull, press, x = map(np.asarray, derivatives(scene, zero))
         whole = np.zeros((zero.size + 2,) * 2)
         whole[:-2, :-2] = matrix.reshape(zero.size, -1)
         whole[:-2, -2] = whole[-2, :-2] = -pull.ravel()
@@ -90,7 +104,7 @@ class TestBody:
         known = np.linalg.solve(whole[np.ix_(gone, gone)], whole[np.ix_(gone, kept)])
         schur = whole[np.ix_(kept, kept)] - whole[np.ix_(kept, gone)] @ known
         body = condensed(scene)
-        np.testing.assert_allclose(body.x, elastic.x, atol=1e-15)
+        np.testing.assert_allclose(body.x, x, atol=1e-15)
         size = np.sqrt(np.abs(np.diag(schur)))
         size = np.where(size > 0.0, size, 1.0)  # a shell is not squeezed
         np.testing.assert_allclose(
@@ -159,38 +173,26 @@ class TestHistory:
         assert again.scene.plan == exact.scene.plan
         np.testing.assert_array_equal(again.fields, exact.fields)
 
-    @pytest.mark.doubtful("few nodes", "in the corner", "single nodes", "the section squeeze")
-    def test_a_laminate_that_lifts_while_its_end_is_moved(self):
-        moved = {"load.control": "displacement", "load.amplitude": 4e-5}
-        rough = {"contact.friction": 0.4, "contact.pressure": 2.5}
-        scene = BODIES["laminate"].replace(SOFT | rough | moved)
-        exact = jb.solve(scene)
+    def test_a_strip_that_lifts_while_its_end_is_moved(self):
+        lifting = {
+            "strip.height_ratio": 0.4,
+            "contact.friction": 0.4,
+            "contact.stick_stiffness": 50.0,
+        }
+        scene = MOVED.replace(lifting)
+        path = 5e-5 * np.append(np.arange(1, 5) / 4.0, 1.0 - np.arange(1, STEPS - 3) / 8.0)
+        steps = jb.solve(scene, path, throw=False)
+        line = scene.replace({"model.by": "auto"}).on_grid(41, scene.plan.end_size)
+        exact = jb.solve(line, path, throw=False)
+        assert exact.scene.plan.on_contact_line
+        assert not steps.scene.plan.on_contact_line
         assert float(exact.gap.max()) > 1e-7
-        steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
         # Slip spreads evenly from node to node on the contact line; in load steps nodes slip whole.
-        scale = float(steps.force.max())
-        np.testing.assert_allclose(exact.force, steps.force[::80], atol=5e-3 * scale)
-        assert float(exact.dissipation) == pytest.approx(float(steps.dissipation), rel=0.02)
+        np.testing.assert_allclose(exact.force, steps.force, atol=0.02 * np.max(steps.force))
+        assert np.sum(exact.slip_work) == pytest.approx(float(np.sum(steps.slip_work)), rel=0.05)
 
 
 class TestFigures:
-    def test_derivatives_of_the_dissipation_have_slope_two(self):
-        keys = ("strip.height_ratio", "contact.friction")
-        scene = BODIES["shell"].replace({"load.amplitude": 0.9})
-        at = jnp.array([float(scene.get(key)) for key in keys])
-        response = jb.response(scene, keys, ["dissipation"])
-
-        def work(numbers):
-            return response(*numbers)["dissipation"]
-
-        ask = jax.jit(lambda x, way: (*jax.jvp(work, (x,), (way,)), jax.grad(work)(x)))
-        for way in at * jnp.eye(2):
-            value, forward, reverse = ask(at, way)
-            assert float(forward) == pytest.approx(float(reverse @ way), rel=1e-10)
-            sizes = (2e-4, 1e-4)  # on 17 nodes slopes change a little .05 % away
-            rest = [abs(float(ask(at + h * way, way)[0] - value - h * forward)) for h in sizes]
-            assert np.log2(rest[0] / rest[1]) == pytest.approx(2.0, abs=0.1)
-
     @pytest.mark.slow
     def test_sweeps_and_joints_take_them(self):
         scene = BODIES["shell"].replace({"load.steps_per_half_cycle": 1})

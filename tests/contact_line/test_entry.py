@@ -6,17 +6,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scenes import FEW, PLANE, SQUEEZE
 from toy import rows_of
 
 import jbeamshell as jb
 from jbeamshell.contact_line import entry
 from jbeamshell.contact_line.ends import beyond, compliance, end_section
-from jbeamshell.contact_line.section import section_form
 from jbeamshell.mechanics.layered import Material, layered_form
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import ENTRIES
 
-PLANE = jb.Scene().replace({"model.section": "plane"})
 FIGURES = ("dissipation", "secant_stiffness", "slip_length", "peak_displacement")
 NUMBERS = ("strip.height_ratio", "contact.friction", "load.amplitude")
 QUICK = ["member", "guided"]  # the force of a part that goes on, and of a held end
@@ -51,9 +50,12 @@ class TestElements:
     @pytest.mark.parametrize("name", ENTRIES)
     def test_a_strip_on_few_nodes(self, name):
         rows = [r for r in elements(name) if (r["mu"], r["A"]) in {(0.1, 0.4359), (0.3, 3.0)}]
-        errors = np.array([off(name, row, 65) for row in rows])
         assert len(rows) >= 5
-        assert np.all(np.abs(errors) < [0.02, 0.003])
+        for row in rows:
+            numbers = dict(zip(NUMBERS, (row["eta"], row["mu"], row["A"]), strict=True))
+            run = jb.solve(PLANE.replace({"load.entry": name} | numbers), throw=False)
+            assert float(run.dissipation) == pytest.approx(row["D"], rel=0.02)
+            assert float(run.secant_stiffness) == pytest.approx(row["K_conjugate"], rel=0.003)
 
     @pytest.mark.slow
     @pytest.mark.parametrize("name", ENTRIES)
@@ -66,77 +68,74 @@ class TestElements:
 
     def test_the_edge_opens_as_far(self):
         (row,) = (r for r in elements("member") if (r["eta"], r["mu"], r["A"]) == (H, 0.1, 0.7855))
-        history = jb.solve(PLANE.replace({"model.nodes": 97}))  # the edge is .01 H from the corner
-        opened = jnp.sum((history.w[history.pressed + 1 :] > 0.0) * history.tributary, axis=1)
-        assert float(jnp.max(opened)) == pytest.approx(row["open_length"], rel=0.1)
+        history = jb.solve(PLANE, throw=False)
+        opened = np.sum((history.w[history.pressed + 1 :] > 0.0) * history.tributary, axis=1)
+        assert float(np.max(opened)) == pytest.approx(row["open_length"], rel=0.1)
+
+
+@functools.partial(jax.jit, static_argnames="forwards")
+def layers_beyond(lengths, forwards=True):
+    """End of an unlike pair of layers that goes on; its compliances alone, and its signs."""
+    thickness, stiffness = jnp.array([0.3, 0.7]), jnp.array([2.0, 5.0])
+    form = layered_form(Material(thickness, stiffness, 0.4 * stiffness, 0.3 * stiffness))
+    end = beyond(form, lengths, end_section(form, on_contact=False), forwards)
+    own = compliance(form, form.pull, bends=False), compliance(form, form.pull)
+    return end, own, jnp.where(jnp.asarray(form.held), -1.0, 1.0)
 
 
 class TestBeyond:
     def test_two_half_heights_are_enough(self):
         """Dissipation over the length beyond, beside that of the default (see `entry.REACH`)."""
-        scene = PLANE.replace({"load.amplitude": 0.2, "model.nodes": 65})
-        ask = jb.response(scene.replace({"strip.overhang": H}), ("strip.overhang",))
+        scene = PLANE.replace({"load.amplitude": 0.2})
         whole = float(jb.solve(scene, throw=False).dissipation)
-        parts = [float(ask(length * H)["dissipation"]) / whole for length in (0.5, 1.0, 2.0, 16.0)]
+        parts = [
+            float(jb.solve(scene.replace({"strip.overhang": n * H}), throw=False).dissipation)
+            / whole
+            for n in (0.5, 1.0, 2.0, 16.0)
+        ]
         assert np.all(np.diff(parts) > 0.0)
         assert parts[0] < 0.75
         np.testing.assert_allclose(parts[2:], 1.0, rtol=2e-3)
 
     def test_a_given_length_adds_its_stretch(self):
-        scene = PLANE.replace({"load.amplitude": 0.4359, "model.nodes": 65})
+        scene = PLANE.replace({"load.amplitude": 0.4359})
         longer = jb.solve(scene.replace({"strip.overhang": 2.0}), throw=False)
         added = 1.0 / longer.secant_stiffness - 1.0 / jb.solve(scene, throw=False).secant_stiffness
         assert float(added) == pytest.approx(2.0 / 3.4e4, rel=1e-3)
 
     def test_a_long_part_of_a_layered_section_stretches_and_bends_as_it_should(self):
-        thickness, stiffness = jnp.array([0.3, 0.7]), jnp.array([2.0, 5.0])
-        form = layered_form(Material(thickness, stiffness, 0.4 * stiffness, 0.3 * stiffness))
-        free = end_section(form, on_contact=False)
-        short, long = (
-            beyond(form, jnp.full(160, length / 160), free, True) for length in (4.0, 6.0)
+        (short, (straight, bent), _), (long, *_) = (
+            layers_beyond(np.full(160, length / 160)) for length in (4.0, 6.0)
         )
-        added = long.softness - short.softness
+        added = float(long.softness) - float(short.softness)
         # The end turns, too: what is added is that of the force and of its moment.
-        assert float(added) > 2.0 * float(compliance(form, form.pull, bends=False))
-        np.testing.assert_allclose(added, 2.0 * compliance(form, form.pull), rtol=1e-4)
+        assert added > 2.0 * float(straight)
+        np.testing.assert_allclose(added, 2.0 * float(bent), rtol=1e-4)
 
     def test_both_directions_are_mirror_images(self):
-        form = section_form(PLANE)
-        lengths = jnp.asarray([0.01, 0.05, 0.3])
-        sides = [
-            beyond(form, lengths, end_section(form, on_contact=False), f) for f in (True, False)
-        ]
-        mirror = np.where(form.held, -1.0, 1.0)  # u_x turns round, u_y stays
-        one, other = sides
-        np.testing.assert_allclose(
-            one.stiffness, mirror[:, None] * other.stiffness * mirror, atol=1e-6 * 3.4e4
+        lengths = np.array([0.01, 0.05, 0.3])
+        (one, _, mirror), (other, *_) = (layers_beyond(lengths, f) for f in (True, False))
+        mirror, stiffness = np.asarray(mirror), np.asarray(one.stiffness)
+        np.testing.assert_allclose(  # u_x turns round, u_y stays
+            stiffness, mirror[:, None] * other.stiffness * mirror, atol=1e-6 * stiffness.max()
         )
         np.testing.assert_allclose(one.softness, other.softness, rtol=1e-9)
 
 
 class TestSections:
     def test_a_straight_section_has_a_rigid_face_by_nature(self):
-        scene = jb.Scene().replace(
-            {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33}
-        )
-        runs = [jb.solve(scene.replace({"load.entry": name}), throw=False) for name in ENTRIES]
-        loss = [float(run.dissipation) for run in runs]
-        member, face, guided, traction = loss
+        runs = [jb.solve(SQUEEZE.replace({"load.entry": name}), throw=False) for name in ENTRIES]
+        member, face, guided, traction = (float(run.dissipation) for run in runs)
         assert member == face == traction
         assert guided > 1.02 * face
 
-    @pytest.mark.parametrize(
-        ("name", "section"),
-        [
-            ("face", "squeeze"),
-            ("guided", "squeeze"),
-        ],
-    )
-    def test_load_steps_and_the_contact_line_agree(self, name, section):
+    @pytest.mark.slow
+    @pytest.mark.parametrize("name", ["face", "guided"])
+    def test_load_steps_and_the_contact_line_agree(self, name):
         """The end of the beamshell is held alike in both."""
-        few = {"load.entry": name, "model.kinematics": "linear"}
+        few = {"load.entry": name, "model.kinematics": "linear", "model.section": "squeeze"}
         few |= {"contact.stick_stiffness": 50.0, "load.steps_per_half_cycle": 20}
-        scene = jb.Scene().replace(few | {"model.section": section}).on_grid(17, 1.0 / 6.0)
+        scene = jb.Scene().replace(few).on_grid(17, 1.0 / 6.0)
         line, steps = (jb.solve(scene, throw=False, by=by) for by in (None, "steps"))
         assert line.scene.plan.on_contact_line
         assert not steps.scene.plan.on_contact_line
@@ -151,10 +150,11 @@ class TestJoints:
     @pytest.mark.parametrize(
         "scene",
         [library.double_shear(), pytest.param(library.single_lap(), marks=pytest.mark.slow)],
+        ids=["double shear", "single lap"],
     )
     def test_members_that_go_on_are_those_with_overhangs(self, scene):
         """The default goes on by 2 H; lengths that are given add their stretch alone."""
-        scene = scene.replace({"load.entry": "member", "model.nodes": 65})
+        scene = scene.replace(FEW | {"load.entry": "member"})
         short = jb.solve(scene, throw=False)
         given = {"strip.overhang": 2.0 * H, "member.overhang": 2.0 * H}
         longer = jb.solve(scene.replace(given), throw=False)
@@ -164,7 +164,8 @@ class TestJoints:
 
     def test_members_are_pressed_evenly_before_they_are_mounted(self):
         """Else the edge of each member presses into the other one, which goes on there."""
-        joint = library.double_shear().replace({"model.nodes": 65, "strip.overhang": 0.5})
+        given = {"strip.overhang": 0.5, "member.overhang": 0.5}
+        joint = library.double_shear().replace(FEW | given)
         even, edged = (
             np.asarray(run.reaction[run.pressed])
             for run in (
@@ -179,18 +180,19 @@ class TestJoints:
 class TestEnergy:
     @pytest.mark.parametrize("name", QUICK + SLOW)
     def test_the_loop_holds_the_work_of_friction(self, name):
-        values = {"load.entry": name, "load.amplitude": 0.4359, "model.nodes": 33}
+        values = {"load.entry": name, "load.amplitude": 0.4359}
         run = jb.solve(PLANE.replace(values | {"load.steps_per_half_cycle": 400}), throw=False)
         assert float(run.dissipation_loop) == pytest.approx(float(run.dissipation), rel=1e-4)
         work = float(run.secant_stiffness * run.peak_displacement**2)
-        assert float(jnp.max(jnp.abs(run.energy_imbalance))) < 1e-4 * work
+        assert float(np.max(np.abs(run.energy_imbalance))) < 1e-4 * work
 
 
 class TestDisplacement:
     @pytest.mark.parametrize("name", QUICK + SLOW)
     def test_what_the_entry_names_is_driven(self, name):
         """A displacement that a force has made takes that force."""
-        scene = PLANE.replace({"load.entry": name, "model.nodes": 33, "load.cycles": 1})
+        steps = {"load.steps_per_half_cycle": 40}
+        scene = PLANE.replace({"load.entry": name} | steps)
         pulled = jb.solve(scene, throw=False)
         path = np.asarray(pulled.displacement[pulled.pressed + 1 :])
         size = {"load.control": "displacement", "load.amplitude": float(np.max(path))}
@@ -199,38 +201,6 @@ class TestDisplacement:
         np.testing.assert_allclose(
             driven.force[-path.size :], pulled.force[-path.size :], atol=3e-4 * 0.7855
         )
-
-
-class TestDerivatives:
-    @pytest.mark.parametrize(
-        "name", ["member", pytest.param("guided", marks=pytest.mark.slow), *SLOW]
-    )
-    def test_taylor_slope_is_two(self, name):
-        """What a first-order step leaves of all figures falls with the square of the step."""
-        scene = PLANE.replace({"load.entry": name, "model.nodes": 17, "load.amplitude": 0.6})
-        ask = jb.response(scene, NUMBERS, FIGURES)
-        at = jnp.asarray([H, 0.1, 0.6])
-        way = jnp.asarray([0.3 * H, -0.02, 0.1])
-
-        @jax.jit
-        def figures(step):
-            found = ask(*(at + step * way))
-            return jnp.stack([found[figure] for figure in FIGURES])
-
-        value, slope = jax.jvp(figures, (jnp.zeros(()),), (jnp.ones(()),))
-        steps = np.array([1e-3, 1e-4])
-        left = np.array([figures(step) - value - step * slope for step in steps]) / value
-        small = np.abs(left) < 1e-12
-        falls = np.log10(np.abs(left[0]) / np.maximum(np.abs(left[1]), 1e-300))
-        assert np.all(small[1] | (np.abs(falls - 2.0) < 0.2)), (left, falls)
-
-    def test_a_length_beyond_has_a_slope(self):
-        scene = PLANE.replace({"strip.overhang": H, "model.nodes": 17, "load.amplitude": 0.4})
-        ask = jb.response(scene, ("strip.overhang",), FIGURES)
-        slope = jax.jacfwd(lambda length: ask(length)["secant_stiffness"])(H)
-        step = 1e-5 * H
-        ahead, behind = (ask(H + way * step)["secant_stiffness"] for way in (1.0, -1.0))
-        assert float(slope) == pytest.approx(float(ahead - behind) / (2.0 * step), rel=1e-5)
 
 
 def test_one_state_serves_where_the_ends_are_the_same():

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scenes import FEW
 from toy import rows_of
 
 import jbeamshell as jb
@@ -22,9 +23,14 @@ from jbeamshell.scene import library
 
 BOLTED = Path(lap.__file__).with_name("lap.json")
 JOINT = {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0}
-SQUEEZE = jb.Scene().replace(JOINT | {"model.section": "squeeze"})
+SQUEEZE = jb.Scene().replace(FEW | JOINT | {"model.section": "squeeze"})
 pytestmark = pytest.mark.doubtful("the section squeeze")  # which these joints name
 BOLT = [[0.75, 0.0], [0.75, 40.0], [1.25, 40.0], [1.25, 0.0]]
+BOLTED_SHELL = SQUEEZE.replace(
+    {"model.section": "shell", "member.support": "clamped", "load.amplitude": 0.5}
+    | {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT}
+    | {"load.steps_per_half_cycle": 40}
+)
 
 
 def elements(problem):
@@ -95,12 +101,11 @@ class TestLimits:
                 float(getattr(base, name)), rel=1e-4
             )
 
-    @pytest.mark.parametrize("ratio", [1.0, 3.0])
-    def test_thin_members_are_bars_that_lap(self, ratio):
+    def test_thin_members_are_bars_that_lap(self):
+        ratio = 3.0
         thin = {"strip.height_ratio": 0.001, "member.height_ratio": 0.001}
-        thin |= {"member.axial_stiffness": 3.4e4 * ratio, "model.nodes": 129}
-        thin |= {"load.cycles": 1}
-        history = jb.solve(SQUEEZE.replace(thin))
+        thin |= {"member.axial_stiffness": 3.4e4 * ratio}
+        history = jb.solve(SQUEEZE.replace(thin), throw=False)
         bars = 3.4e4, 3.4e4 * ratio
         u = float(lap_backbone(1.0, *bars, 2.0, 1.0))
         assert float(history.dissipation) == pytest.approx(
@@ -109,11 +114,9 @@ class TestLimits:
         assert 1.0 / float(history.secant_stiffness) == pytest.approx(u, rel=0.002)
         assert float(history.dissipation_ratio) == pytest.approx(1.0, rel=0.01)
 
-    @pytest.mark.doubtful("few nodes")
     def test_overhangs_are_springs_in_series(self):
-        short = SQUEEZE.replace({"model.nodes": 33})
-        joint = jb.solve(short)
-        longer = jb.solve(short.replace({"strip.overhang": 0.6, "member.overhang": 0.4}))
+        joint = jb.solve(SQUEEZE)
+        longer = jb.solve(SQUEEZE.replace({"strip.overhang": 0.6, "member.overhang": 0.4}))
         added = 1.0 / longer.secant_stiffness - 1.0 / joint.secant_stiffness
         assert float(added) == pytest.approx(1.0 / 3.4e4, rel=0.01)
         tips = []
@@ -134,10 +137,8 @@ class TestBalance:
         assert loop == pytest.approx(work, rel=1e-6)
 
     def test_members_move_apart_by_gap_and_slip(self):
-        values = {"model.section": "shell", "member.support": "clamped", "load.amplitude": 0.5}
-        values |= {"model.nodes": 65, "contact.pressure": BOLT, "contact.bottom_pressure": BOLT}
-        history = jb.solve(SQUEEZE.replace(values), throw=False)
-        scale = float(jnp.max(jnp.abs(history.v)))
+        history = jb.solve(BOLTED_SHELL, throw=False)
+        scale = float(np.max(np.abs(history.v)))
         np.testing.assert_allclose(
             history.w - history.member[..., 1], history.gap, atol=1e-9 * scale
         )
@@ -161,9 +162,8 @@ class TestBalance:
         carried = history.traction @ history.tributary
         np.testing.assert_allclose(carried, history.force, atol=1e-9)
 
-    @pytest.mark.doubtful("few nodes")
     def test_assembly_with_friction_locks_shear_in(self):
-        values = {"member.axial_stiffness": 1e5, "model.nodes": 33}
+        values = {"member.axial_stiffness": 1e5}
         smooth = jb.solve(SQUEEZE.replace(values))
         rough = jb.solve(SQUEEZE.replace(values | {"member.assembly": "frictional"}))
         held = np.abs(np.asarray(rough.traction[0]))
@@ -244,7 +244,8 @@ def moments(amplitude, **values):
 
 class TestMoments:
     @pytest.mark.parametrize(
-        "section", ["squeeze", "shell", pytest.param("plane", marks=pytest.mark.slow)]
+        "section",
+        ["squeeze", *(pytest.param(n, marks=pytest.mark.slow) for n in ("shell", "plane"))],
     )
     def test_an_arm_adds_the_rotation_of_the_end(self, section):
         scene = library.single_lap().replace({"model.section": section, "model.nodes": 25})
@@ -359,11 +360,8 @@ class TestGap:
 
 
 def test_a_single_lap_beyond_its_gross_slip_is_told():
-    values = {"member.support": "clamped", "member.loaded_end": "level", "load.amplitude": 1.99}
-    values |= {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT, "model.section": "shell"}
-    values |= {"model.nodes": 41, "load.steps_per_half_cycle": 2, "load.cycles": 1}
     with pytest.raises(jb.UnconvergedError, match="all of the contact slides"):
-        jb.solve(SQUEEZE.replace(values))
+        jb.solve(BOLTED_SHELL.replace({"load.amplitude": 1.99}))
 
 
 def test_a_saved_joint_is_read_again(tmp_path):
@@ -374,40 +372,9 @@ def test_a_saved_joint_is_read_again(tmp_path):
     assert again.figures() == history.figures()
 
 
-def test_derivatives_have_slope_two():
-    keys = ("strip.height_ratio", "member.height_ratio", "contact.friction")
-    scene = SQUEEZE.replace({"member.height_ratio": 0.12}).pinned()
-
-    def work(numbers):
-        return jb.solve(scene.replace(dict(zip(keys, numbers, strict=True)))).dissipation
-
-    at, way = jnp.array([0.11, 0.12, 0.1]), jnp.array([0.1, -0.1, 0.05])
-    along = jax.jit(lambda x: jax.jvp(work, (x,), (way,)))
-    value, slope = along(at)
-    errors = [abs(along(at + h * way)[0] - value - h * slope) for h in (4e-4, 2e-4)]
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
-
-
-@pytest.mark.doubtful("few nodes")
 def test_plane_members_are_computed_in_double_precision():
-    expected = float(jb.solve(library.double_shear().replace({"model.nodes": 33})).dissipation)
+    expected = float(jb.solve(library.double_shear().replace(FEW)).dissipation)
     with jax.enable_x64(False):
-        found = jb.solve(library.double_shear().replace({"model.nodes": 33}))
+        found = jb.solve(library.double_shear().replace(FEW))
     assert found.force.dtype == np.float32
     assert float(found.dissipation) == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_planted_height_and_friction_are_found():
-    true = SQUEEZE.replace({"member.height_ratio": 0.15})
-    random, loops = np.random.default_rng(0), []
-    for amplitude in (1.0, 1.5):
-        force, u = map(np.asarray, jb.solve(true.replace({"load.amplitude": amplitude})).loop)
-        noise = 2e-3 * np.ptp(u) * random.normal(size=u.size)
-        loops.append(jb.measured.Loop(force, u + noise, label=f"A = {amplitude}"))
-    start = true.replace({"member.height_ratio": 0.11, "contact.friction": 0.12})
-    free = ["member.height_ratio", "contact.friction"]
-    fit = jb.identify.fit(loops, start, free)
-    for key, value in zip(free, (0.15, 0.1), strict=True):
-        assert fit.values[key] == pytest.approx(value, abs=3.0 * fit.errors[key])
-        assert fit.errors[key] < 0.01 * value

@@ -36,15 +36,26 @@ def two_layers():
     return Material(thickness, stiffness, 0.4 * stiffness, 0.3 * stiffness)
 
 
+LAYERS = jax.jit(lambda: layered_form(two_layers()))
+
+
+@jax.jit
+def eliminated(x, loads, given):
+    """Elimination of two layers, its stations' stiffness, and inner fields of what is given."""
+    form = layered_form(two_layers())
+    far, loaded = end_section(form, "held"), end_section(form)
+    ((elimination, found),) = strip.eliminate(form, x, loads[:, None], far, loaded)
+    return form.element(jnp.diff(x)), found, elimination.recovered(given)
+
+
 class TestSection:
     def test_rigid_motions_and_unit_strains_have_the_energy_of_the_plane(self):
-        material = two_layers()
-        form = layered_form(material)
+        material, form = two_layers(), jax.tree.map(np.asarray, LAYERS())
         # Translations along X and across, which no strain belongs to.
         for mode in form.modes[:2, 1]:
             np.testing.assert_allclose(form.values @ mode, 0.0, atol=1e-8)
             np.testing.assert_allclose(form.mixed.T @ mode, 0.0, atol=1e-12)
-        h, c, lam, g = material
+        h, c, lam, g = map(np.asarray, material)
         s = np.cumsum(h) - 0.5
         inertia = ((s**3) - (s - h) ** 3) / 3.0
         exact = [h @ c, h @ g, inertia @ c, h @ c, inertia @ g]
@@ -55,7 +66,7 @@ class TestSection:
         np.testing.assert_allclose(squeeze @ form.mixed @ stretch, h @ lam, rtol=1e-12)
 
     def test_means_find_rotation_and_squeeze(self):
-        form = layered_form(two_layers())
+        form = jax.tree.map(np.asarray, LAYERS())
         np.testing.assert_allclose(form.further @ form.modes[2, 1], [1.0, 0.0], atol=1e-12)
         np.testing.assert_allclose(form.further @ form.modes[3, 0], [0.0, 1.0], atol=1e-12)
         np.testing.assert_allclose(form.pull @ form.modes[0, 1], 1.0, rtol=1e-12)
@@ -63,9 +74,10 @@ class TestSection:
 
 class TestBody:
     def test_elimination_is_that_of_the_whole_matrix(self):
-        form, x = layered_form(two_layers()), jnp.array([0.0, 1.0, 1.7, 2.0])
-        loads, n, m = jnp.array([0.3, 0.8, 0.5, 0.2]), 4, form.pull.size
-        start, end, across = (np.asarray(part) for part in form.element(jnp.diff(x)))
+        form, x = jax.tree.map(np.asarray, LAYERS()), np.array([0.0, 1.0, 1.7, 2.0])
+        loads, n, m = np.array([0.3, 0.8, 0.5, 0.2]), 4, form.pull.size
+        given = np.random.default_rng(0).normal(size=(2 * n + 2, 3))
+        (start, end, across), found, inner = jax.tree.map(np.asarray, eliminated(x, loads, given))
         whole = np.zeros((n * m + 2, n * m + 2))
         for i in range(n - 1):
             a, b = slice(i * m, i * m + m), slice(i * m + m, i * m + 2 * m)
@@ -81,13 +93,9 @@ class TestBody:
         gone = [i for i in range(n * m) if i not in kept and i not in held]
         known = np.linalg.solve(whole[np.ix_(gone, gone)], whole[np.ix_(gone, kept)])
         schur = whole[np.ix_(kept, kept)] - whole[np.ix_(kept, gone)] @ known
-        far, loaded = end_section(form, "held"), end_section(form)
-        ((elimination, found),) = strip.eliminate(form, x, loads[:, None], far, loaded)
         np.testing.assert_allclose(found, schur, atol=1e-10 * np.abs(schur[:8, :8]).max())
-        given = np.random.default_rng(0).normal(size=(2 * n + 2, 3))
         recovered = np.zeros((n * m, 3))
         recovered[gone] = -known @ given
-        inner = np.asarray(elimination.recovered(jnp.asarray(given)))
         np.testing.assert_allclose(inner, recovered.reshape(n, m, 3)[:, 2:], atol=1e-7)
 
     def test_a_uniform_pressure_squeezes_uniformly(self):
@@ -189,14 +197,6 @@ class TestHistory:
         imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
         assert imbalance < 0.01  # trapezoids of the work over 40 steps a branch
 
-    @pytest.mark.slow
-    def test_load_steps_only_say_where_the_path_is_looked_at(self):
-        few, many = ({"load.steps_per_half_cycle": count} for count in (2, 40))
-        scene = plane_strip(0.1126, 0.3)
-        one, other = (plane(scene, **steps) for steps in (few, many))
-        assert float(one.dissipation) == pytest.approx(float(other.dissipation), rel=1e-10)
-        np.testing.assert_allclose(one.slip[-1], other.slip[-1], atol=1e-12 * one.slip.max())
-
     def test_it_stands_beside_the_beamshell(self):
         scene = plane_strip(0.0511)
         elastic, shell = plane(scene), jb.solve(scene)
@@ -214,18 +214,6 @@ class TestHistory:
 
 
 class TestScene:
-    @pytest.mark.slow
-    def test_a_response_is_what_a_run_says(self):
-        scene = plane_strip(0.1126).replace({"model.section": "plane", "model.nodes": 33})
-        one_step = scene.replace({"load.steps_per_half_cycle": 1})
-        ask = jb.response(one_step, ["contact.friction", "load.amplitude"], ["dissipation"])
-        for mu, amplitude in ((0.1, 1.0), (0.5, 3.0)):  # nested, and walked event by event
-            numbers = {"contact.friction": mu, "load.amplitude": amplitude}
-            run = jb.solve(one_step.replace(numbers))
-            found = ask(mu, amplitude)
-            assert int(found["status"]) == 0
-            np.testing.assert_allclose(found["dissipation"], run.dissipation, rtol=1e-10)
-
     @pytest.mark.doubtful("few nodes")
     def test_a_history_is_read_as_it_was_written(self, tmp_path):
         history = plane(plane_strip(0.1126), **{"model.nodes": 33, "load.steps_per_half_cycle": 1})
@@ -242,51 +230,3 @@ class TestScene:
         assert np.all(table.status == 0)
         alone = plane(scene, **{"model.nodes": 33, "contact.friction": 0.5}).dissipation
         np.testing.assert_allclose(table["dissipation"][1], alone, rtol=1e-10)
-
-    @pytest.mark.slow
-    def test_displacement_control_walks_the_loop_of_the_force_and_goes_beyond(self):
-        few = {"model.nodes": 33, "load.steps_per_half_cycle": 2}
-        force = plane(plane_strip(0.1126), **few)
-        control = {"load.control": "displacement", "load.amplitude": force.displacement[1]}
-        driven = plane_strip(0.1126).replace({"model.section": "plane"} | few | control)
-        moved = jb.solve(driven, force.displacement[1:])
-        # Corners are rounded over displacements here and over forces there, on 33 nodes.
-        np.testing.assert_allclose(moved.force, force.force, atol=2e-4)
-        np.testing.assert_allclose(moved.target, moved.displacement, rtol=1e-12)
-        loose = {"load.amplitude": 1e-3, "strip.far_end": "free"}  # nothing but friction holds it
-        beyond = plane(plane_strip(0.1126), **few, **control | loose)
-        np.testing.assert_allclose(beyond.force[1], 2.0, rtol=1e-8)  # mu F_N L
-
-    @pytest.mark.slow
-    def test_soft_sliders_make_the_strip_softer_and_keep_its_energy(self):
-        few = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
-        ideal, soft = (
-            plane(plane_strip(0.1126), **few, **{"contact.stick_stiffness": alpha})
-            for alpha in (None, 0.3)
-        )
-        assert float(soft.secant_stiffness) < 0.95 * float(ideal.secant_stiffness)
-        for history in (ideal, soft):
-            imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
-            assert imbalance < 0.05  # trapezoids of the work over 8 steps a branch
-
-    @pytest.mark.slow
-    def test_a_traced_path_is_the_path(self):
-        scene = plane_strip(0.1126).replace({"model.section": "plane", "model.nodes": 17})
-        loads = np.array([0.5, 1.0, 0.4, -0.3, -0.8, -0.8, 0.1, 1.0])
-        run = jb.solve(scene, loads)
-        traced = jax.jit(lambda path: jb.solve(scene, path, throw=False))(loads)
-        assert not np.any(traced.status)
-        for name in ("displacement", "slip_work", "traction"):
-            known = getattr(run, name)
-            close = 1e-9 * np.abs(known).max()
-            np.testing.assert_allclose(getattr(traced, name), known, atol=close)
-
-    @pytest.mark.slow
-    def test_a_fit_finds_planted_parameters(self):
-        few = {"model.section": "plane", "model.nodes": 49, "load.steps_per_half_cycle": 10}
-        scene = jb.Scene().replace(few)
-        planted = {"contact.friction": 0.12, "strip.height_ratio": 0.09}
-        loop = jb.measured.make_loop(*map(np.asarray, jb.solve(scene.replace(planted)).loop))
-        found = jb.identify.fit(loop, scene, list(planted))
-        for key, value in planted.items():
-            assert found.values[key] == pytest.approx(value, rel=2e-3)

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scenes import MOVED, SQUEEZE, STEPS
 
 import jbeamshell as jb
 from jbeamshell.contact_line import contact_state, drives, strip, walk
@@ -13,6 +14,9 @@ from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.pressures import Press, walk_with_pressures
 from jbeamshell.scene.load_path import whole_path
+from jbeamshell.scene.plan import LINE
+from jbeamshell.scene.plan import STEPS as LOAD_STEPS
+from jbeamshell.solving.solve import _able
 
 MU, NODES = 0.3, 21
 SCENE = jb.Scene().replace(
@@ -154,10 +158,12 @@ class TestPath:
         total = float(np.sum(many.slip_work))
         np.testing.assert_allclose(back.slip_work, many.slip_work, atol=5e-3 * total)
 
-    def test_taylor_slope_is_two_and_reverse_is_forward(self, pressed):
+    @pytest.fixture
+    def figures(self, pressed):
+        """Works and displacements over friction, stiffness, load and part of the pressures."""
         (body, press, _, _), _ = pressed
 
-        def figures(friction, stiffer, load, part):
+        def found(friction, stiffer, load, part):
             # The contact that was pressed is at its limit of friction, wherever that is.
             share = -press.g_t, -press.g_n
             rough = press_roughly(body.K_tt, body.K_tn, body.K_nn, *share, friction)
@@ -166,20 +172,29 @@ class TestPath:
             )
             own = dataclasses.replace(body, K_nn=stiffer * body.K_nn, K_tt=stiffer * body.K_tt)
             path = jnp.asarray([load, load, -load]), jnp.stack([1.0 + 0.0 * part, part, 1.2 * part])
-            found = walk_with_pressures(own, press, friction, start, *path, rough.lift)
-            return jnp.append(1e3 * found.slip_work, found.state.displacement)
+            levels = walk_with_pressures(own, press, friction, start, *path, rough.lift)
+            return jnp.append(1e3 * levels.slip_work, levels.state.displacement)
 
-        at, way = (MU, 1.0, 2.0, 0.6), (0.02, 0.03, 0.1, -0.04)
-        forward = jax.jit(lambda at: jax.jvp(figures, at, way))
-        value, slope = forward(at)
+        return found
+
+    AT, WAY = (MU, 1.0, 2.0, 0.6), (0.02, 0.03, 0.1, -0.04)
+
+    def test_taylor_slope_is_two(self, figures):
+        forward = jax.jit(lambda at: jax.jvp(figures, at, self.WAY))
+        value, slope = forward(self.AT)
 
         def left(h):
-            moved, _ = forward(tuple(a + h * b for a, b in zip(at, way, strict=True)))
+            moved, _ = forward(tuple(a + h * b for a, b in zip(self.AT, self.WAY, strict=True)))
             return np.linalg.norm(moved - value - h * slope)
 
         assert np.log2(left(2e-3) / left(1e-3)) == pytest.approx(2.0, abs=0.15)
-        back = jax.jit(jax.grad(lambda *at: figures(*at)[2], argnums=(0, 1, 2, 3)))(*at)
-        assert float(np.dot(back, way)) == pytest.approx(float(slope[2]), rel=1e-9)
+        jax.eval_shape(jax.grad(lambda *at: figures(*at)[2]), *self.AT)  # also in reverse
+
+    @pytest.mark.slow
+    def test_reverse_derivatives_are_those_of_the_forward_ones(self, figures):
+        _, slope = jax.jit(lambda at: jax.jvp(figures, at, self.WAY))(self.AT)
+        back = jax.jit(jax.grad(lambda *at: figures(*at)[2], argnums=(0, 1, 2, 3)))(*self.AT)
+        assert float(np.dot(back, self.WAY)) == pytest.approx(float(slope[2]), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -207,16 +222,34 @@ def test_a_cycle_of_the_load_is_none_where_the_pressures_do_not_close():
     assert whole_path(SCENE, loads)[1] == ()
 
 
-@pytest.mark.parametrize("least", [1e-3, 0.0])
-def test_pressures_that_vanish_take_load_steps(least):
-    moved = {"load.control": "displacement", "load.amplitude": 1.5e-5, "load.entry": "face"}
-    scene = jb.Scene().replace(moved | {"model.section": "squeeze", "model.nodes": 21})
-    time = np.linspace(0.0, 2.0 * np.pi, 21)[1:]
-    path = np.stack([1.5e-5 * np.sin(time), np.maximum(1.0 + np.sin(time), least)], axis=1)
+TIME = np.linspace(0.0, 2.0 * np.pi, STEPS + 1)[1:]
+
+
+def moved_while_pressed(least):
+    """Displacements of a cycle, and pressures that fall to a least part of themselves."""
+    path = np.stack([1.5e-5 * np.sin(TIME), np.maximum(1.0 + np.sin(TIME), least)], axis=1)
     path[14, 1] = least
-    history = jb.solve(scene, path, throw=False)
+    return path
+
+
+def test_pressures_that_nearly_vanish_are_walked():
+    scene = SQUEEZE.replace({"load.control": "displacement", "load.amplitude": 1.5e-5})
+    history = jb.solve(scene, moved_while_pressed(1e-3), throw=False)
     assert history.converged
-    assert history.scene.plan.engine == ("load steps" if least == 0.0 else "contact line")
+    assert history.scene.plan.engine == LINE
+
+
+def test_pressures_that_vanish_or_change_beside_elastic_sliders_take_load_steps():
+    soft = MOVED.replace({"model.by": "auto"})
+    assert soft.plan.engine == LINE
+    history = jb.solve(soft, moved_while_pressed(0.0), throw=False)
+    assert history.converged
+    assert history.scene.plan.engine == LOAD_STEPS
+    ideal = SQUEEZE.replace({"load.control": "displacement", "load.amplitude": 1.5e-5})
+    for scene, least, engine in ((soft, 0.5, LOAD_STEPS), (ideal, 0.0, LOAD_STEPS)):
+        assert _able(scene, moved_while_pressed(least), None).plan.engine == engine
+    with pytest.raises(jb.InputError, match="must act wholly beside elastic sliders"):
+        jb.solve(soft.replace({"model.section": "plane"}), moved_while_pressed(0.5))
 
 
 @pytest.mark.slow

@@ -3,13 +3,15 @@
 import jax
 import numpy as np
 import pytest
+from scenes import FEW
+from scenes import PLANE as SCENE
 
 import jbeamshell as jb
 from jbeamshell.contact_line.interpolation import CLOSE, Bodies, built
 from jbeamshell.contact_line.shared import shared
 from jbeamshell.scene.keys import ENTRIES
 
-PLANE = jb.Scene().replace({"model.section": "plane", "model.nodes": 25, "load.amplitude": 0.5})
+PLANE = SCENE.replace({"load.amplitude": 0.5})
 HEIGHT, POISSON, FRICTION, LOAD = (
     "strip.height_ratio",
     "strip.poisson_ratio",
@@ -53,8 +55,9 @@ def test_it_is_checked_and_refined_until_it_is_close():
     own = PLANE.replace({HEIGHT: 0.083})
     assert isinstance(bodies, Bodies)
     assert len(bodies.terms) < 12
-    body, condensed = bodies.strip(own).body, shared(own, [LOAD], FIGURES)
-    strip = condensed.layout.strip(condensed.numbers, own)
+    condensed = shared(own, [LOAD], FIGURES)
+    body = jax.jit(lambda own: bodies.strip(own).body)(own)
+    strip = jax.jit(condensed.layout.strip)(condensed.numbers, own)
     for name in ("K_tt", "K_tn", "K_nn", "f_t", "f_n"):
         one, other = np.asarray(getattr(body, name)), np.asarray(getattr(strip.body, name))
         assert np.max(np.abs(one - other)) <= CLOSE * np.max(np.abs(other)), name
@@ -78,7 +81,9 @@ def test_heights_that_were_not_built_are_condensed_or_unconverged():
 
 
 @pytest.mark.parametrize(
-    "scene", [PLANE.replace(TABLE), jb.library.single_lap().replace({"model.nodes": 33})], ids=str
+    "scene",
+    [PLANE.replace(TABLE), jb.library.single_lap().replace(FEW)],
+    ids=["strip", "lap joint"],
 )
 def test_one_strip_serves_all_loads(scene):
     ask = jb.response(scene, [LOAD, FRICTION])

@@ -3,7 +3,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from toy import STRIP
+from scenes import PLANE, STEPPED
 
 import jbeamshell as jb
 from jbeamshell.history import contact_line
@@ -35,7 +35,7 @@ def test_cycles_are_found_in_any_path(path, turns, cycles):
 
 
 def test_figures_of_the_standard_strip():
-    history = jb.solve(STRIP.replace({"model.kinematics": "linear"}))
+    history = jb.solve(PLANE.replace({"load.steps_per_half_cycle": 40}))
     force, displacement = map(np.asarray, history.loop)
     assert force.size == 81
     assert float(history.dissipation) == pytest.approx(
@@ -47,7 +47,8 @@ def test_figures_of_the_standard_strip():
         float(history.dissipation) / (np.pi * 0.7855 * amplitude)
     )
     *_, stop = history.cycles[-1]
-    last = jnp.zeros_like(history.slip_work).at[stop].set(1.0)
+    last = np.zeros_like(history.slip_work)
+    last[stop] = 1.0
     assert float(dataclasses.replace(history, slip_work=last).dissipation) == 1.0
     # Well past onset the slip zone is F - 1.7 eta long (mu F_N = 1).
     assert float(history.slip_length) == pytest.approx(0.7855 - 1.7 * 0.1126, abs=0.05)
@@ -60,23 +61,10 @@ def test_figures_of_the_standard_strip():
 
 
 def test_a_path_without_a_cycle_has_no_dissipation_per_cycle():
-    coarse = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
-    history = jb.solve(STRIP.replace(coarse), np.linspace(0.1, 0.6, 18))
+    history = jb.solve(STEPPED, np.linspace(0.1, 0.6, 20), throw=False)
     with pytest.raises(jb.InputError, match="no closed cycle"):
         _ = history.dissipation
     assert float(jnp.sum(history.slip_work)) > 0.0
-
-
-@pytest.mark.slow
-def test_energy_balances_at_every_step():
-    """External work is stored or dissipated, up to the second order of the load step."""
-    worst = []
-    for steps in (40, 80):
-        scene = STRIP.replace({"model.nodes": 41, "load.steps_per_half_cycle": steps})
-        history = jb.solve(scene)
-        worst.append(float(jnp.max(jnp.abs(history.energy_imbalance)) / history.dissipation))
-    assert worst[1] < 1e-3
-    assert np.log2(worst[0] / worst[1]) > 1.7
 
 
 def test_the_contact_ends_where_the_force_of_its_last_node_is_used_up():

@@ -7,9 +7,9 @@ import warnings
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
+from scenes import FEW, STEPPED, two_cycles
 from toy import STRIP
 
 import jbeamshell as jb
@@ -33,8 +33,13 @@ KEYS = (
     "contact.stick_stiffness",
 )
 SQUEEZE = jb.Scene().replace({"model.section": "squeeze", "model.tolerance": 0.005})
-COARSE = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
 LITTLE = {"strip.height_ratio": 0.2, "load.amplitude": 0.3}  # only the corner slips
+
+
+def coarse(values=None, **how):
+    """Run on few nodes in few load steps."""
+    scene = STEPPED.replace(values or {})
+    return jb.solve(scene, two_cycles(float(scene.load.amplitude)), **how)
 
 
 OVERHANG = {  # slender, and pressed over a third of its length
@@ -55,23 +60,19 @@ def random_values(count):
     return values
 
 
-def check_random_scenes(count, settings, in_vain):
+def check_random_scenes(count, run, in_vain):
     """Check that no scene is off by 2 % without a doubt, and few fail or are doubted in vain."""
-
-    @jax.jit
-    def run(values):
-        scene = STRIP.replace(settings | dict(zip(KEYS, values, strict=True)))
-        history = jb.solve(scene, throw=False)
+    ends = []
+    for values, recorded in zip(random_values(count), RECORD["scenes"][:count], strict=True):
+        history = run(dict(zip(KEYS, values, strict=True)))
         found = (
             history.dissipation_ratio,
             *error_estimates.dissipation_errors(history.slip_cycle),
             history.closure,
+            np.max(history.iterations),
+            np.max(history.status),
         )
-        return jnp.stack([*found, jnp.max(history.iterations), jnp.max(history.status)])
-
-    ends = []
-    for values, recorded in zip(random_values(count), RECORD["scenes"][:count], strict=True):
-        found = [v if np.isfinite(v) else None for v in run(values).tolist()]
+        found = [float(v) if np.isfinite(v) else None for v in found]
         ends.append(outcome([*found, *recorded[6:8]]))
     assert "wrong, silently" not in ends
     assert ends.count("fails, and says so") <= 0.005 * count
@@ -80,12 +81,13 @@ def check_random_scenes(count, settings, in_vain):
 
 
 def test_no_random_scene_is_wrong_silently():
-    check_random_scenes(60, COARSE | {"model.nodes": 81}, 0.4)
+    # On 41 nodes few nodes do the slipping more often than on 81, where a third is in vain.
+    check_random_scenes(60, lambda values: coarse(values, throw=False), 0.55)
 
 
 @pytest.mark.slow(minutes=17)
 def test_no_scene_of_two_thousand_is_wrong_silently():
-    check_random_scenes(2000, {}, 0.2)
+    check_random_scenes(2000, lambda values: jb.solve(STRIP.replace(values), throw=False), 0.2)
 
 
 @pytest.mark.parametrize(("name", "least"), [("scenes", 2000), ("fresh scenes", 200)])
@@ -241,19 +243,19 @@ def test_the_error_of_the_grid_is_larger_where_the_pressure_has_steps():
             assert grid == pytest.approx(factor * 64**-1.5)
 
 
-@pytest.mark.doubtful("in the corner", "the section squeeze")
+@pytest.mark.doubtful("in the corner", "the section squeeze", "single nodes", "within a load step")
 def test_a_doubtful_run_warns_with_the_fix():
-    scene = STRIP.replace(LITTLE | COARSE)
     with pytest.warns(jb.DoubtfulWarning, match=r"off by about \d+ %: few nodes do .*model.nodes"):
-        history = jb.solve(scene)
+        history = coarse(LITTLE)
     assert history.figures()["doubts"] == list(history.doubts)
     assert f"doubtful: {history.doubts[0]}" in str(history)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        again = jb.solve(scene, throw=False)
+        again = coarse(LITTLE, throw=False)
     assert again.doubts == history.doubts
 
 
+@pytest.mark.slow
 def test_the_standard_strip_is_beyond_doubt():
     with warnings.catch_warnings():
         warnings.simplefilter("error", jb.DoubtfulWarning)
@@ -312,21 +314,19 @@ def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
 
 @pytest.mark.slow
 def test_the_estimate_falls_with_the_elements():
-    scene = STRIP.replace({"load.amplitude": 0.3} | COARSE)
+    scene = STEPPED.replace({"load.amplitude": 0.3})
     sizes = (1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0)
-    runs = [jb.solve(scene.on_grid(COARSE["model.nodes"], size)) for size in sizes]
+    runs = [jb.solve(scene.on_grid(41, size)) for size in sizes]
     grid = [float(error_estimates.dissipation_errors(run.slip_cycle)[0]) for run in runs]
     assert grid[0] > 2.0 * grid[1] > 4.0 * grid[2]
 
 
-@pytest.mark.doubtful("nothing slips")
 def test_where_nothing_slips_the_dissipation_is_doubted():
     tiny = {"load.amplitude": 1e-4, "contact.stick_stiffness": 2.0}
-    history = jb.solve(STRIP.replace(tiny | COARSE))
+    history = coarse(tiny, throw=False)
     assert np.isinf(history.dissipation_error)
     assert "nothing slips" in history.doubts[0]
-    frictionless = STRIP.replace({"contact.friction": 0.0} | COARSE)
-    assert jb.solve(frictionless).doubts == ()
+    assert coarse({"contact.friction": 0.0}).doubts == ()
 
 
 @pytest.mark.doubtful("nothing slips")
@@ -347,7 +347,9 @@ def test_where_nothing_slips_on_any_grid_no_change_is_told():
     ],
 )
 def test_what_a_scene_alone_makes_doubtful(changes, told):
-    doubts = reliability.doubts_of_scene(STRIP.replace(COARSE | changes))
+    doubts = reliability.doubts_of_scene(
+        STRIP.replace({"model.nodes": 41, "model.kinematics": "linear"} | changes)
+    )
     assert len(doubts) == (told is not None)
     assert all(told in doubt for doubt in doubts)
 
@@ -403,9 +405,8 @@ def test_a_laminate_that_rests_on_its_corner_is_doubted_as_much_as_it_is_off():
 
 
 @pytest.mark.parametrize("unit", [1e-30, 1e30])
-@pytest.mark.doubtful("few nodes")
 def test_the_estimate_knows_no_units(unit):
-    history = jb.solve(STRIP.replace(COARSE))
+    history = coarse(throw=False)
     cycle = history.slip_cycle._replace(dissipation=history.dissipation)
     scaled = cycle._replace(
         **{name: unit * getattr(cycle, name) for name in ("x", "tributary", "v", "half_height")},
@@ -419,37 +420,43 @@ def test_the_estimate_knows_no_units(unit):
     np.testing.assert_allclose(other, own, rtol=1e-12)
 
 
-@pytest.mark.doubtful("few nodes")
 def test_an_open_loop_and_a_failed_run_are_doubted():
-    history = jb.solve(STRIP.replace(COARSE))
-    shifted = history.displacement.at[-1].add(0.01 * jnp.ptp(history.displacement))
+    history = jax.tree.map(np.array, coarse(throw=False))
+    shifted = history.displacement.copy()
+    shifted[-1] += 0.01 * np.ptp(shifted)
     opened = history.but(displacement=shifted)
     assert any("does not close" in doubt for doubt in opened.doubts)
-    failed = history.but(status=history.status.at[-1].set(1))
+    failed = history.but(status=np.append(history.status[:-1], 1))
     assert [doubt[:33] for doubt in failed.doubts] == ["a load step found no equilibrium:"]
 
 
 # --- many cycles, few digits ----------------------------------------------------------------------
 
 
-@pytest.mark.doubtful("few nodes")
-def test_a_thousand_cycles_neither_drift_nor_lose_energy():
-    settings = {"model.nodes": 21, "load.cycles": 1000}
-    history = jb.solve(STRIP.replace(COARSE | settings))
+@pytest.mark.parametrize(
+    ("cycles", "steps"), [(9, 1), pytest.param(1000, 4, marks=pytest.mark.slow)]
+)
+def test_cycles_neither_drift_nor_lose_energy(cycles, steps):
+    branch = 0.7855 * (1.0 - 2.0 * np.arange(1, steps + 1) / steps)
+    path = np.append([0.7855] * (1 if steps > 1 else 2), [*branch, *-branch] * cycles)
+    history = jb.solve(STEPPED, path, throw=False)
     ends = np.array([stop for _, _, stop in history.cycles])
     closed = np.asarray(history.displacement)[ends[1:]]
     assert np.max(np.abs(np.diff(closed))) < 1e-8 * np.ptp(np.asarray(history.displacement))
     lost = np.diff(np.cumsum(np.asarray(history.slip_work))[ends[1:]])
     assert np.ptp(lost) < 1e-8 * lost[0]
-    # The trapezoid of four steps misses the same part of the work in every cycle.
+    # The trapezoid of few steps misses the same part of the work in every cycle.
     missed = np.diff(np.asarray(history.energy_imbalance)[ends[1:]])
     assert np.ptp(missed) < 1e-8 * lost[0]
-    assert float(history.dissipation_loop) == pytest.approx(float(history.dissipation), rel=0.02)
+    if steps > 1:
+        lost = float(history.dissipation)
+        assert float(history.dissipation_loop) == pytest.approx(lost, rel=0.02)
 
 
 @pytest.mark.slow
 def test_load_steps_are_solved_in_double_precision():
-    shell = COARSE | {"model.section": "shell", "contact.normal": "held"}
+    shell = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
+    shell |= {"model.section": "shell", "contact.normal": "held"}
     code = f"""
 import json, warnings
 import jbeamshell as jb
@@ -464,7 +471,7 @@ print(json.dumps([str(history.force.dtype), float(history.dissipation)]))
 
 # --- mounting of a single lap -------------------------------------------------------------------
 
-OPEN = jb.library.single_lap().replace({"load.entry": "member", "model.nodes": 65})
+OPEN = jb.library.single_lap().replace(FEW | {"load.entry": "member"})
 KEYS_OF_OVERHANGS = ("member.overhang", "strip.overhang")
 
 
@@ -476,7 +483,7 @@ def mounted(history):
     return [doubt for doubt in history.doubts if "bends by the lengths" in doubt]
 
 
-@pytest.mark.parametrize("section", ["plane", "squeeze"])
+@pytest.mark.parametrize("section", ["plane", pytest.param("squeeze", marks=pytest.mark.slow)])
 def test_a_single_lap_without_overhangs_is_doubted_by_what_they_make(section):
     scene = OPEN.replace({"model.section": section})
     history = jb.solve(scene, throw=False)
@@ -491,9 +498,10 @@ def test_a_single_lap_without_overhangs_is_doubted_by_what_they_make(section):
     assert not mounted(longer)
 
 
+@pytest.mark.doubtful("few nodes", "gathers in the corner")
 def test_the_doubt_of_a_mounting_is_a_warning_and_is_saved(tmp_path):
     with pytest.warns(jb.DoubtfulWarning, match="a single lap bends by the lengths"):
-        history = jb.solve(OPEN.replace({"model.nodes": "auto"}))
+        history = jb.solve(OPEN)
     history.save(tmp_path / "run.npz")
     assert jb.read_history(tmp_path / "run.npz").doubts == history.doubts
 
@@ -516,6 +524,7 @@ def test_a_joint_that_is_driven_by_its_displacement_is_told_under_the_same_force
     assert slides.overhung is None  # its force is that of gross slip with any overhangs
 
 
+@pytest.mark.slow
 def test_overhangs_change_nothing_where_the_loaded_end_may_deflect():
     """The joint is statically determinate then."""
     scene = OPEN.replace({"member.loaded_end": "free"})

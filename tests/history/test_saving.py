@@ -8,21 +8,12 @@ import pickle
 import jax
 import numpy as np
 import pytest
-from toy import STRIP
+from scenes import STEPPED, held_at
 
 import jbeamshell as jb
 from jbeamshell.common.arrays import read_arrays, write_arrays
 
-OWN = STRIP.replace(
-    {
-        "model.nodes": 9,
-        "model.kinematics": "linear",
-        "load.steps_per_half_cycle": 2,
-        "load.cycles": 1,
-    }
-)
-SCENE = OWN.pinned()
-PATH = np.array([0.5, 1.0, 0.25, -0.5, -0.25, 0.25, 1.0, 0.25, -0.5])
+PATH = held_at([0.5, 1.0, 0.25, -0.5, -0.25, 0.25, 1.0, 0.25, -0.5])
 
 
 def same(one, other):
@@ -37,7 +28,7 @@ def same(one, other):
 
 @pytest.fixture(scope="module")
 def history():
-    return jb.solve(SCENE, PATH, throw=False)
+    return jb.solve(STEPPED, PATH, throw=False)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +48,7 @@ def test_a_saved_history_is_the_same_to_the_last_bit(history, saved):
 
 
 def test_a_scene_read_again_has_the_same_answer(history, tmp_path):
-    third = OWN.replace({"contact.friction": 1.0 / 30.0 + 0.1})
+    third = STEPPED.replace({"contact.friction": 1.0 / 30.0 + 0.1})
     jb.write_scene(third, tmp_path / "scene.toml")
     again = jb.read_scene(tmp_path / "scene.toml")
     one, other = (jb.solve(scene, PATH, by="steps", throw=False) for scene in (third, again))
@@ -131,7 +122,7 @@ def damaged(path, evil):
         "turned": replaced(path, displacement=displacement[:, None]),
         "single": replaced(path, displacement=displacement.astype(np.float32)),
         "complex": replaced(path, displacement=displacement * 1j),
-        "of words": replaced(path, displacement=np.array(["a"] * 10)),
+        "of words": replaced(path, displacement=np.array(["a"] * 21)),
         "of another format": with_about(path, format="jbeamshell history 2"),
         "no scene": with_about(path, scene=""),
         "no toml": with_about(path, scene="[strip"),

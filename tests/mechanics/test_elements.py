@@ -18,7 +18,7 @@ from jbeamshell.mechanics.elements import element_rule
 DEGREES = {"finite-difference": (1, 1), "collocation": (3, 3)}
 rules = pytest.mark.parametrize("name", DEGREES)
 ETAS = [1e-4, 1e-2, 0.1126, 0.4, 2.0]
-COUNTS = [2, 3, 10, 41, 200, 1000]
+COUNTS = [2, 41, 200]
 
 
 def powers(degree, x):
@@ -93,10 +93,9 @@ def test_vertices_increase_and_elements_grade_one_way(elements):
 @pytest.mark.parametrize("elements", COUNTS)
 def test_doubling_the_count_halves_every_element(elements):
     for eta in ETAS:
-        coarse = vertices(elements, 2.0, eta)
-        fine = vertices(2 * elements, 2.0, eta)
+        coarse, fine = (np.asarray(vertices(n * elements, 2.0, eta)) for n in (1, 2))
         np.testing.assert_allclose(fine[::2], coarse, atol=2e-14)
-        parts = jnp.diff(fine).reshape(-1, 2) / jnp.diff(coarse)[:, None]
+        parts = np.diff(fine).reshape(-1, 2) / np.diff(coarse)[:, None]
         if elements >= 200:
             np.testing.assert_allclose(parts, 0.5, atol=0.03)
 
@@ -129,25 +128,35 @@ def test_small_elements_grow_fast_up_to_where_others_begin():
     assert sizes[-1] == pytest.approx(end * eta * last, rel=1e-6)
 
 
+@functools.partial(jax.jit, static_argnums=0)
+def nodes_of(name, ends):
+    """Nodes and their tributary lengths."""
+    rule = element_rule(name)
+    return grid.nodes(rule, ends), grid.tributary_lengths(rule, ends)
+
+
 @rules
-@pytest.mark.parametrize("eta", ETAS)
-def test_tributary_lengths_fill_the_strip(name, eta):
-    rule, ends = element_rule(name), vertices(10, 2.0, eta)
-    x, lengths = grid.nodes(rule, ends), grid.tributary_lengths(rule, ends)
-    assert x.shape == lengths.shape == (10 * grid.ORDER[name] + 1,)
-    assert (jnp.diff(x) > 0).all()
-    assert (lengths > 0).all()
-    np.testing.assert_allclose(lengths.sum(), 2.0, rtol=1e-14)
-    np.testing.assert_allclose(lengths @ x, 2.0, rtol=1e-14)  # int x dx over [0, 2]
+def test_tributary_lengths_fill_the_strip(name):
+    for eta in ETAS:
+        x, lengths = map(np.asarray, nodes_of(name, vertices(10, 2.0, eta)))
+        assert x.shape == lengths.shape == (10 * grid.ORDER[name] + 1,)
+        assert (np.diff(x) > 0).all()
+        assert (lengths > 0).all()
+        np.testing.assert_allclose(lengths.sum(), 2.0, rtol=1e-14)
+        np.testing.assert_allclose(lengths @ x, 2.0, rtol=1e-14)  # int x dx over [0, 2]
 
 
 @rules
 def test_gather_and_scatter_are_adjoint(name):
     order, rng = grid.ORDER[name], np.random.default_rng(1)
-    nodal = jnp.asarray(rng.normal(size=(7 * order + 1, 4)))
-    elementwise = jnp.asarray(rng.normal(size=(7, order + 1, 4)))
-    gathered = jnp.vdot(grid.gather(nodal, order), elementwise)
-    np.testing.assert_allclose(gathered, jnp.vdot(nodal, grid.scatter(elementwise)), rtol=1e-13)
+    nodal = rng.normal(size=(7 * order + 1, 4))
+    elementwise = rng.normal(size=(7, order + 1, 4))
+    gathered, scattered = jax.jit(lambda a, b: (grid.gather(a, order), grid.scatter(b)))(
+        nodal, elementwise
+    )
+    np.testing.assert_allclose(
+        np.vdot(gathered, elementwise), np.vdot(nodal, scattered), rtol=1e-13
+    )
 
 
 @rules
@@ -228,7 +237,7 @@ def test_the_single_focus_is_geometric_and_then_uniform():
 
 
 def test_vertices_are_smooth_in_the_steps():
-    slope = jax.jacrev(functools.partial(vertices_at, 60))(jnp.array([0.7, 1.1]))
+    slope = jax.jit(jax.jacrev(functools.partial(vertices_at, 60)))(jnp.array([0.7, 1.1]))
     for i, by in enumerate(1e-6 * np.eye(2)):
         forth, back = (vertices_at(60, jnp.array([0.7, 1.1]) + s * by) for s in (1, -1))
         np.testing.assert_allclose(slope[:, i], (forth - back) / 2e-6, atol=1e-6)
@@ -289,9 +298,9 @@ def test_loads_are_exact_wherever_they_step(name, x, step, value):
 @rules
 def test_the_force_and_its_moment_do_not_depend_on_the_nodes(name):
     step = jnp.array([[0.0, 3.0], [0.7, 3.0], [0.7, 1.0], [2.0, 1.0]])
-    for count in (3, 41):
+    for count in (10, 41):
         ends = vertices(count, 2.0, 0.1)
-        got, x = loads(name, ends, step), grid.nodes(element_rule(name), ends)
+        got, x = np.asarray(loads(name, ends, step)), np.asarray(nodes_of(name, ends)[0])
         np.testing.assert_allclose(got.sum(), 2.1 + 1.3, rtol=1e-13)
         np.testing.assert_allclose(got @ x, 2.1 * 0.35 + 1.3 * 1.35, rtol=1e-13)
 
@@ -302,22 +311,23 @@ def test_a_table_goes_on_with_its_end_values(name):
     whole = short.at[0, 0].set(0.0).at[-1, 0].set(2.0)
     np.testing.assert_allclose(loads(name, NODES, short), loads(name, NODES, whole), atol=1e-15)
     for load in (jnp.array(7.0), jnp.array([[0.3, 7.0], [0.3, 7.0], [0.3, 7.0], [1.0, 7.0]])):
-        lengths = grid.tributary_lengths(element_rule(name), jnp.asarray(NODES))
+        _, lengths = nodes_of(name, NODES)
         np.testing.assert_allclose(loads(name, NODES, load), 7.0 * lengths, rtol=1e-14)
 
 
 @rules
 @pytest.mark.parametrize("at", [0.7, 0.5, 0.93])  # 0.5 is a vertex
 def test_loads_are_differentiable_in_where_they_step(name, at):
+    @jax.jit
     def stepped(at):
         table = jnp.array([[0.0, 3.0], [0.0, 3.0], [0.0, 1.0], [2.0, 1.0]])
         return loads(name, NODES, table.at[1:3, 0].set(at))
 
-    slope = jax.jacrev(stepped)(at)
+    slope = np.asarray(jax.jit(jax.jacrev(stepped))(at))
     forth, back = stepped(at + 1e-6), stepped(at - 1e-6)
     np.testing.assert_allclose(slope, (forth - back) / 2e-6, atol=5e-5)
     # Moving the step adds load of the height 3 - 1 at X = at.
-    x = grid.nodes(element_rule(name), jnp.asarray(NODES))
+    x = np.asarray(nodes_of(name, NODES)[0])
     np.testing.assert_allclose([slope.sum(), slope @ x], [2.0, 2.0 * at], rtol=1e-12)
 
 
@@ -327,7 +337,8 @@ def test_rows_on_nodes_and_ends_have_their_slopes(name, row):
     """No kink is there: the slopes from both sides are one, and the force's is in closed form."""
     table = jnp.array([[0.0, 3.0], [0.5, 7.0], [2.0, 4.0]])
     way = jnp.zeros_like(table).at[row, 0].set(1.0)
-    slope = jax.jvp(lambda t: loads(name, NODES, t), (table,), (way,))[1]
+    along = jax.jit(lambda t, way: jax.jvp(lambda t: loads(name, NODES, t), (t,), (way,))[1])
+    slope = np.asarray(along(table, way))
     forth, back = (loads(name, NODES, table + h * way) for h in (1e-6, -1e-6))
     np.testing.assert_allclose(slope, (forth - back) / 2e-6, atol=5e-5)
     # The force is the area of two trapezoids, between end values that go on.

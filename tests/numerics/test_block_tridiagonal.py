@@ -7,7 +7,7 @@ import pytest
 
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal, jacobian, linear_solve, solve
 
-SHAPES = [(9, 1), (6, 2), (7, 3), (8, 4), (5, 6)]
+SHAPES = [(6, 2), (7, 3), (5, 6)]  # of entries, of cofactors, of whole blocks
 shapes = pytest.mark.parametrize(("n", "m"), SHAPES)
 
 
@@ -45,7 +45,7 @@ def vector(n, m, seed=1):
 @shapes
 def test_jacobian_recovers_a_matrix_from_its_action(n, m):
     matrix = matrix_of(n, m)
-    found = jacobian(lambda x: apply(matrix, x), jnp.zeros((n, m)))
+    found = jax.jit(lambda zero: jacobian(lambda x: apply(matrix, x), zero))(np.zeros((n, m)))
     np.testing.assert_allclose(dense(found), dense(matrix), atol=1e-13)
     for got, blocks in zip(found, matrix, strict=True):
         np.testing.assert_allclose(got, blocks, atol=1e-13)
@@ -55,15 +55,16 @@ def test_jacobian_recovers_a_matrix_from_its_action(n, m):
 def test_transpose(n, m):
     matrix = matrix_of(n, m)
     np.testing.assert_array_equal(dense(matrix.transpose), dense(matrix).T)
-    assert not jnp.any(matrix.transpose.lower[..., 0])
-    assert not jnp.any(matrix.transpose.upper[..., -1])
+    assert not np.any(np.asarray(matrix.transpose.lower)[..., 0])
+    assert not np.any(np.asarray(matrix.transpose.upper)[..., -1])
 
 
 @shapes
 def test_solve_is_the_dense_solution(n, m):
     matrix, rhs = matrix_of(n, m), vector(n, m)
     expected = np.linalg.solve(dense(matrix), rhs.ravel())
-    np.testing.assert_allclose(solve(matrix, rhs).ravel(), expected, rtol=1e-11, atol=1e-14)
+    found = np.asarray(jax.jit(solve)(matrix, rhs))
+    np.testing.assert_allclose(found.ravel(), expected, rtol=1e-11, atol=1e-14)
 
 
 def scaled_solve(scale, rhs):
@@ -76,22 +77,25 @@ def test_linear_solve_and_its_derivatives():
     n, m = 8, 4
     rhs, d_rhs, out = vector(n, m), vector(n, m, 2), vector(n, m, 3)
     scale, d_scale = jnp.array(0.7), jnp.array(-1.3)
-    x, dx = jax.jvp(scaled_solve, (scale, rhs), (d_scale, d_rhs))
+    x, dx = map(
+        np.asarray,
+        jax.jit(lambda *at: jax.jvp(scaled_solve, at[:2], at[2:]))(scale, rhs, d_scale, d_rhs),
+    )
 
     full = dense(matrix_of(n, m)) + 0.7 * np.cos(0.7) * np.eye(n * m)
     np.testing.assert_allclose(full @ x.ravel(), rhs.ravel(), atol=1e-12)
     slope = (np.cos(0.7) - 0.7 * np.sin(0.7)) * -1.3
-    right = d_rhs.ravel() - slope * x.ravel()
+    right = np.ravel(d_rhs) - slope * x.ravel()
     np.testing.assert_allclose(full @ dx.ravel(), right, atol=1e-12)
 
-    _, back = jax.vjp(scaled_solve, scale, rhs)
-    in_scale, in_rhs = back(out)
-    transposed = jnp.vdot(in_scale, d_scale) + jnp.vdot(in_rhs, d_rhs)
-    np.testing.assert_allclose(jnp.vdot(out, dx), transposed, rtol=1e-12)
+    in_scale, in_rhs = jax.jit(lambda *at: jax.vjp(scaled_solve, *at)[1](out))(scale, rhs)
+    transposed = float(in_scale) * float(d_scale) + np.vdot(in_rhs, d_rhs)
+    np.testing.assert_allclose(np.vdot(out, dx), transposed, rtol=1e-12)
 
 
 def test_linear_solve_in_a_batch():
     scales, sides = jnp.array([0.1, 0.9, 2.0]), jnp.stack([vector(8, 4, s) for s in (4, 5, 6)])
-    batch = jax.vmap(scaled_solve)(scales, sides)
+    batch = jax.jit(jax.vmap(scaled_solve))(scales, sides)
+    alone = jax.jit(scaled_solve)
     for scale, rhs, x in zip(scales, sides, batch, strict=True):
-        np.testing.assert_allclose(x, scaled_solve(scale, rhs), rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(x, alone(scale, rhs), rtol=1e-12, atol=1e-15)

@@ -421,17 +421,6 @@ def test_contact_length_by_two_methods(case):
     np.testing.assert_allclose(length, by_elements, atol=1.5e-3)
 
 
-def test_series_for_the_contact_length_converge():
-    """Convergence is spectral for the strip, of fourth order for the beam under a force."""
-    strip = [gauss_chebyshev("elastic", n, (1.2, 1.45))[0] for n in (8, 12, 40)]
-    errors = np.abs(np.array(strip[:2]) - strip[2])
-    assert errors[0] < 2e-4
-    assert errors[1] < errors[0] / 50
-    beam = [gauss_chebyshev("beam", n, (1.1, 1.4))[0] for n in (20, 40, 80, 160)]
-    steps = np.abs(np.diff(beam))
-    assert (steps[:-1] > 10 * steps[1:]).all()
-
-
 def test_the_kernels_of_contact_hold_filons_mid_plane():
     """A strip of height h bonded to a rigid base is half of one of height 2 h."""
     a = A[(A > 0.1) & (A < 15)]

@@ -2,6 +2,7 @@
 
 import jax
 import pytest
+from scenes import FEW, PLANE
 
 import jbeamshell as jb
 from jbeamshell.scene.mounting import in_words, left_open
@@ -16,7 +17,7 @@ def lap(**values):
 
 def test_a_strip_on_a_base_has_no_mounting():
     assert in_words(jb.Scene()) == ""
-    assert "mounting" not in jb.solve(jb.Scene()).figures()
+    assert "mounting" not in jb.solve(PLANE).figures()
 
 
 def test_one_line_says_supports_overhangs_and_the_loaded_end():
@@ -66,10 +67,11 @@ def test_a_single_lap_that_goes_on_leaves_its_overhangs_open(values, keys):
     assert left_open(lap().replace(values)) == keys
 
 
+@pytest.mark.doubtful("few nodes", "lanes may be off")
 def test_every_print_of_a_joint_says_it(tmp_path):
-    scene = jb.library.single_lap()
+    scene = jb.library.single_lap().replace(FEW)
     line = in_words(scene)
-    history = jb.solve(scene)
+    history = jb.solve(scene, throw=False)
     assert line in str(scene)
     assert line in str(history)
     assert history.figures()["mounting"] == line

@@ -157,7 +157,7 @@ def test_a_strip_that_is_held_down_does_not_lift():
     assert "held down in load steps" in str(held.plan)
 
 
-@pytest.mark.doubtful("the section squeeze")
+@pytest.mark.slow
 def test_load_steps_lift_as_the_contact_line_does():
     """Kept down, this strip would dissipate 5 % less, and as much with sliders of alpha G/H."""
     thick = {"strip.height_ratio": 0.35, "contact.friction": 0.4, "load.amplitude": 2.0}
@@ -318,15 +318,6 @@ def test_a_doubt_about_chosen_nodes_names_the_tolerance():
     assert "more model.nodes" in given.doubts[0]
 
 
-def test_pressures_that_change_beside_elastic_sliders_take_load_steps():
-    path = np.array([[0.2, 1.0], [0.2, 0.5]])
-    soft = jb.Scene().replace({"model.nodes": 11, "contact.stick_stiffness": 10.0})
-    history = jb.solve(soft, path, throw=False)
-    assert history.scene.plan.engine == STEPS
-    with pytest.raises(jb.InputError, match="must act wholly beside elastic sliders"):
-        jb.solve(soft.replace({"model.section": "plane"}), path)
-
-
 def test_a_plan_does_not_depend_on_the_plan_before():
     little = {"strip.height_ratio": 0.3, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
     before = [jb.Scene().replace(values) for values in ({}, {"strip.kappa_s": 0.5})]
@@ -387,9 +378,9 @@ def test_a_pinned_scene_keeps_its_plan(scene, tmp_path_factory):
 
 @pytest.mark.parametrize(
     "section",
-    ["shell", pytest.param("squeeze", marks=pytest.mark.slow)],
+    ["shell", "squeeze"],
 )
-@pytest.mark.doubtful("the section")
+@pytest.mark.slow
 def test_load_steps_dissipate_as_the_contact_line_does(section):
     """The two engines share the section and the base, not the grid nor the solver."""
     scene = jb.Scene().replace({"model.section": section, "model.kinematics": "linear"})

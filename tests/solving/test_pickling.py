@@ -7,6 +7,7 @@ import pickle
 import jax
 import numpy as np
 import pytest
+from scenes import FEW, PLANE
 
 import jbeamshell as jb
 
@@ -18,20 +19,21 @@ COPIES = {
 
 @pytest.mark.parametrize("how", COPIES)
 def test_scenes_histories_and_sweeps_are_copied_whole(how):
-    scene = jb.Scene().replace({"contact.pressure": [[0.0, 8.0], [2.0, 10.0]]})
-    history = jb.solve(scene, throw=False)
-    for made in (scene, history):
+    history = jb.solve(PLANE, throw=False)
+    table = PLANE.replace({"contact.pressure": [[0.0, 8.0], [2.0, 10.0]]})
+    for made in (table, history):
         again = COPIES[how](made)
         assert jax.tree.structure(again) == jax.tree.structure(made)
         jax.tree.map(np.testing.assert_array_equal, again, made)
-    sweep = jb.sweep(jb.Scene().replace({"model.section": "bar"}), {"load.amplitude": [0.5, 1.0]})
+    bar = jb.Scene().replace(FEW | {"model.section": "bar"})
+    sweep = jb.sweep(bar, {"load.amplitude": [0.5, 1.0]})
     again = COPIES[how](sweep)
     assert again.identical(sweep)
 
 
 @pytest.mark.parametrize("how", COPIES)
 def test_a_response_is_copied_whole(how):
-    ask = jb.response(jb.Scene(), ["load.amplitude"], ["dissipation", "loss_factor"])
+    ask = jb.response(PLANE, ["load.amplitude"], ["dissipation", "loss_factor"])
     again = COPIES[how](ask)
     assert again is not ask
     np.testing.assert_equal(again(0.7), ask(0.7))

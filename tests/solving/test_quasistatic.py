@@ -1,84 +1,76 @@
+"""Load paths in load steps: bar limit, drift, smoothing, order in the grid, failed steps."""
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scenes import HELD, STEPPED, STEPS, held_at
 from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.mechanics import bar
-from jbeamshell.scene.plan import STEPS
+from jbeamshell.scene.plan import STEPS as LOAD_STEPS
 from jbeamshell.solving import solve as solving
 
-SMALL = {
-    "model.nodes": 41,
-    "model.kinematics": "linear",  # compiles in half the time
-    "load.steps_per_half_cycle": 20,
-    "load.cycles": 1,
-}
-EXACT = SMALL | {"model.kinematics": "exact"}  # also with sharp friction by Newton's method
-HELD = EXACT | {"contact.normal": "held"}  # a corner that lifts slips at any load
-SMOOTH = SMALL | {"contact.smoothing": 32.0}
 
-
-def test_bar_limit_gives_backbone_and_cubic_law():
-    thin = {"strip.height_ratio": 0.001, "model.kinematics": "linear", "load.cycles": 1}
-    history = jb.solve(STRIP.replace(thin))
+@pytest.mark.parametrize(
+    ("settings", "error"),
+    [  # measured: 2.3 %, and .1 % on the planned grid
+        ({}, 0.03),
+        pytest.param(
+            {"model.nodes": "auto", "load.steps_per_half_cycle": "auto"},
+            2e-3,
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=["41 nodes", "planned"],
+)
+def test_bar_limit_gives_backbone_and_cubic_law(settings, error):
+    history = jb.solve(STEPPED.replace({"strip.height_ratio": 0.001} | settings), throw=False)
     start = history.cycles[0][0]
     loading = history.force[1 : start + 1]
     backbone = bar.bar_backbone(loading, 3.4e4, 1.0)
-    assert float(history.dissipation_ratio) == pytest.approx(1.0, abs=2e-3)
-    assert float(jnp.max(jnp.abs(history.displacement[1 : start + 1] - backbone))) < 2e-3 * float(
-        backbone[-1]
-    )
+    assert float(history.dissipation_ratio) == pytest.approx(1.0, abs=error)
+    close = error * float(backbone[-1])
+    np.testing.assert_allclose(history.displacement[1 : start + 1], backbone, atol=close)
 
 
-@pytest.mark.slow
-def test_steps_do_not_matter():
-    base = STRIP.replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
-    dissipation = [
-        float(jb.solve(base.replace({"load.steps_per_half_cycle": n})).dissipation)
-        for n in (20, 40, 160)
-    ]
-    error = np.abs(np.array(dissipation) / dissipation[-1] - 1.0)
-    assert error[0] < 5e-3
-    assert error[1] < 2e-3
+SMOOTHED = pytest.param(16.0, 1e-4, marks=pytest.mark.slow)
 
 
-@pytest.mark.parametrize(
-    ("smoothing", "drift"), [("sharp", 1e-12), pytest.param(16.0, 1e-4, marks=pytest.mark.slow)]
-)
-@pytest.mark.doubtful("in the corner", "few nodes", "nothing slips")
-def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
-    scene = STRIP.replace(HELD | {"contact.smoothing": smoothing})
-    path = [*np.linspace(0.01, 0.1, 10), *[-0.1, 0.1] * 100]
-    history = jb.solve(scene.replace({"strip.height_ratio": 0.4}), path)
+def cycled(smoothing, ends, **values):
+    """Strip between two loads for nine cycles."""
+    scene = HELD.replace({"contact.smoothing": smoothing} | values)
+    return jb.solve(scene, np.append(ends[::-1] * 9, np.full(2, ends[-1])), throw=False)
+
+
+@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-12), SMOOTHED])
+def test_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
+    history = cycled(smoothing, [-0.1, 0.1], **{"strip.height_ratio": 0.4})
     cap = history.scene.contact.friction * history.reaction
     assert 0.5 < float(jnp.max(jnp.abs(history.traction / cap))) < 0.8
-    peaks = np.asarray(history.displacement[10::2])
+    peaks = np.asarray(history.displacement[1:19:2])
     assert np.ptp(peaks) < drift * peaks[0]
-    assert float(jnp.sum(jnp.abs(history.slip_work))) / 100 < drift * 0.1 * peaks[0]
+    assert float(jnp.sum(jnp.abs(history.slip_work))) / 9 < drift * 0.1 * peaks[0]
 
 
-@pytest.mark.parametrize(
-    ("smoothing", "drift"), [("sharp", 1e-13), pytest.param(16.0, 1e-4, marks=pytest.mark.slow)]
-)
-@pytest.mark.doubtful("few nodes", "nothing slips", "single nodes")
+@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), SMOOTHED])
 def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
-    scene = STRIP.replace(HELD | {"contact.smoothing": smoothing})
-    history = jb.solve(scene, [*np.linspace(0.07, 0.7, 10), *[0.6, 0.7] * 100])
-    peaks = np.asarray(history.displacement[10::2])
-    creep = abs(peaks[-1] - peaks[0]) / peaks[0] / 100
+    history = cycled(smoothing, [0.6, 0.7])
+    peaks = np.asarray(history.displacement[1:19:2])
+    creep = abs(peaks[-1] - peaks[0]) / peaks[0] / 8
     assert creep < drift
     assert (creep > 1e-6) == (smoothing != "sharp")
-    work = float(jnp.sum(jnp.abs(history.slip_work[11:]))) / 100
+    work = float(jnp.sum(jnp.abs(history.slip_work[2:]))) / 8
     assert work < drift * 0.7 * peaks[0]
 
 
-@pytest.mark.parametrize("smoothing", ["sharp", pytest.param(8.0, marks=pytest.mark.slow), 32.0])
-@pytest.mark.doubtful("few nodes")
+@pytest.mark.slow
+@pytest.mark.parametrize("smoothing", ["sharp", 8.0, 32.0])
 def test_smoothing_does_not_change_the_dissipation(smoothing):
-    scene = STRIP.replace(SMALL | {"contact.smoothing": smoothing})
-    assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
+    values = {"contact.smoothing": smoothing, "load.steps_per_half_cycle": 20}
+    history = jb.solve(STEPPED.replace(values), throw=False)
+    assert float(history.dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
 
 
 @pytest.mark.slow
@@ -105,40 +97,39 @@ def test_order_of_convergence_in_the_grid(grid, order):
 
 # --- failure --------------------------------------------------------------------------------------
 
+BAR = STEPPED.replace({"model.section": "bar"})  # compiles soonest
+LAME = jb.Newton(max_iterations=1, tolerance=1e-12)
+
 
 def test_an_unconverged_step_is_never_silent(monkeypatch):
     # As many pieces as the path has steps: one shape to compile.
-    monkeypatch.setattr("jbeamshell.load_steps.recovery.PIECES", (50,))
-    lame = jb.Newton(max_iterations=1, tolerance=1e-12)
-    scene = STRIP.replace(SMOOTH)
-    with pytest.raises(jb.UnconvergedError, match=r"load step \d+ of 50 .* found no equilibrium"):
-        jb.solve(scene, solver=lame)
-    history = jb.solve(scene, solver=lame, throw=False)
+    monkeypatch.setattr("jbeamshell.load_steps.recovery.PIECES", (STEPS,))
+    path = held_at([0.1, 0.2, 0.9])
+    with pytest.raises(jb.UnconvergedError, match=r"load step \d+ of 20 .* found no equilibrium"):
+        jb.solve(BAR, path, solver=LAME)
+    history = jb.solve(BAR, path, solver=LAME, throw=False)
     first = int(np.argmax(np.asarray(history.status) > 0))
     assert not history.converged
     assert history.status[first] == jb.Status.MAX_ITERATIONS
     assert set(np.asarray(history.status[first + 1 :]).tolist()) == {jb.Status.NOT_REACHED}
     assert bool(jnp.all(jnp.isnan(history.force[first:])))
     assert bool(jnp.all(jnp.isfinite(history.force[:first])))
-    assert bool(jnp.isnan(history.dissipation))
+    assert np.isnan(jb.solve(BAR, solver=LAME, throw=False).dissipation)
 
 
 def test_inside_a_transformation_the_failure_is_loud_too():
-    lame = jb.Newton(max_iterations=1, tolerance=1e-12)  # as above: traced once
-    run = jax.jit(
-        lambda mu: (
-            jb.solve(STRIP.replace(SMOOTH | {"contact.friction": mu}), solver=lame).dissipation
-        )
-    )
+    run = jax.jit(lambda mu: jb.solve(BAR.replace({"contact.friction": mu})).dissipation)
+    known = float(jb.solve(BAR, throw=False).dissipation)
+    assert float(run(0.1)) == pytest.approx(known, rel=1e-12)
     with pytest.raises(Exception, match="a load step found no equilibrium"):
-        jax.block_until_ready(run(0.1))
+        jax.block_until_ready(run(0.03))  # gross slip is at .6
 
 
 @pytest.mark.slow
 def test_a_failed_step_is_walked_in_pieces():
     """The recovered path ends where a path with small steps ends."""
     # So smooth that large steps take more iterations than small ones.
-    scene = STRIP.replace(SMALL | {"contact.smoothing": 4.0})
+    scene = STEPPED.replace({"contact.smoothing": 4.0})
     path = np.array([0.9, -0.9, *[0.9] * 22])  # held at its end, to be as long as the fine one
     eager = jb.Newton(max_iterations=100)
     fine = jb.solve(
@@ -162,35 +153,43 @@ def test_single_precision_says_what_it_cannot_do():
         jb.Newton(tolerance=1e-9).tolerance_for(jnp.dtype("float32"))
 
 
-@pytest.mark.parametrize("path", [[], [[0.1]], [0.1, np.nan], [0.1, np.inf]])
-def test_paths_that_are_none(path):
-    with pytest.raises(jb.InputError, match="path"):
-        jb.solve(STRIP, path)
+@pytest.mark.parametrize(
+    ("path", "told"),
+    [
+        ([], "path"),
+        ([[0.1]], "path"),
+        ([0.1, np.nan], "path"),
+        ([0.1, np.inf], "path"),
+        ([1.0, 2.0], "gross slip"),
+        (None, r"load.amplitude = 2.5.*'displacement'"),
+    ],
+)
+def test_paths_that_are_none(path, told):
+    with pytest.raises(jb.InputError, match=told):
+        jb.solve(BAR.replace({"load.amplitude": 2.5}) if path is None else BAR, path)
 
 
-def test_beyond_gross_slip_force_control_is_refused():
-    with pytest.raises(jb.InputError, match=r"load.amplitude = 2.5.*'displacement'"):
-        jb.solve(STRIP.replace({"load.amplitude": 2.5}))
-    with pytest.raises(jb.InputError, match="gross slip"):
-        jb.solve(STRIP, [1.0, 2.0])
-
-
-@pytest.mark.doubtful("few nodes")
-def test_compiling_alone_solves_nothing():
-    scene = STRIP.replace(SMALL)
-    solving.compile_for(scene)
+def test_compiling_alone_solves_nothing_and_every_run_has_the_same_digits():
+    solving.compile_for(BAR)
     size = solving._stepped._quick._cache_size()
-    jb.solve(scene)
+    first, *rest = (jb.solve(BAR, throw=False) for _ in range(10))
     assert solving._stepped._quick._cache_size() == size
+    assert_equal_digits(first, rest)
 
 
-@pytest.mark.doubtful("few nodes")
+def assert_equal_digits(first, rest):
+    for name in ("force", "displacement", "traction", "slip_work"):
+        values = np.asarray(getattr(first, name))
+        assert all(np.array_equal(values, getattr(history, name)) for history in rest)
+
+
 def test_plain_numbers_inside_a_callers_jit():
-    scene = STRIP.replace(SMOOTH)
-    inside = jax.jit(lambda: jb.solve(scene).dissipation)()
-    assert float(inside) == pytest.approx(float(jb.solve(scene).dissipation), rel=1e-12)
+    def inside(path=None):
+        return jax.eval_shape(lambda: jb.solve(BAR, path).dissipation)
+
+    assert inside().shape == ()
     with pytest.raises(jb.InputError, match="gross slip"):
-        jax.jit(lambda: jb.solve(scene, [1.0, 2.0]).displacement)()
+        inside([1.0, 2.0])
 
 
 @pytest.fixture
@@ -200,13 +199,12 @@ def optimised():
     jax.config.update("jax_disable_most_optimizations", True)
 
 
+@pytest.mark.slow
 def test_the_first_run_has_the_digits_of_the_hundredth(optimised):
     few = {"model.nodes": 5, "model.section": "bar", "model.kinematics": "exact"}
     few |= {"load.cycles": 1, "load.steps_per_half_cycle": 2}
     scene = jb.Scene().replace(few)
     first, *rest = (jb.solve(scene, throw=False) for _ in range(100))
-    assert first.scene.plan.engine == STEPS
+    assert first.scene.plan.engine == LOAD_STEPS
     assert first.converged
-    for name in ("force", "displacement", "traction", "slip_work"):
-        values = np.asarray(getattr(first, name))
-        assert all(np.array_equal(values, getattr(history, name)) for history in rest)
+    assert_equal_digits(first, rest)

@@ -4,7 +4,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.scene import library
@@ -30,16 +29,16 @@ def test_receding_contact_against_the_prototype_and_finite_elements(receding):
     assert figures["reaction_max_at"] == pytest.approx(47.5, rel=0.01)
     assert figures["lift_slope"] == pytest.approx(1.990e-4, rel=0.01)
     assert figures["lift_slope"] == pytest.approx(1.9858e-4, rel=0.01)
-    total = float(jnp.sum(receding.tributary * receding.reaction[0]))
-    assert total == pytest.approx(5000.0, rel=1e-9)
+    assert receding.tributary @ receding.reaction[0] == pytest.approx(5000.0, rel=1e-9)
 
 
 def test_contact_conditions_hold_at_every_node(receding):
-    gap, reaction = receding.gap[0], receding.reaction[0]
-    assert float(jnp.min(gap)) > -1e-15
-    assert float(jnp.min(reaction)) > -1e-5
-    assert float(jnp.max(jnp.abs(jnp.where(receding.touching[0], gap, reaction)))) < 1e-5
-    touching = np.asarray(receding.touching[0])
+    gap, reaction, touching = (
+        np.asarray(getattr(receding, name)[0]) for name in ("gap", "reaction", "touching")
+    )
+    assert np.min(gap) > -1e-15
+    assert np.min(reaction) > -1e-5
+    assert np.max(np.abs(np.where(touching, gap, reaction))) < 1e-5
     assert np.all(np.diff(touching.astype(int)) <= 0)  # one patch, from the middle on
 
 
@@ -53,7 +52,7 @@ def test_the_active_set_does_not_depend_on_where_it_starts(receding, start):
         "random": rng.random(x.size) < 0.5,
     }[start]
     again = jb.solve(library.receding(), contact=contact)
-    assert bool(jnp.all(again.touching == receding.touching))
+    np.testing.assert_array_equal(again.touching, receding.touching)
     np.testing.assert_allclose(again.w, receding.w, atol=1e-12)
 
 
@@ -65,16 +64,16 @@ def test_a_search_that_does_not_end_says_so():
 
 def test_the_contact_does_not_know_how_hard_it_is_pressed(receding):
     half = [[0, 50.0], [50, 50.0], [50, 0.0], [100, 0.0]]
-    contact = np.full(receding.x.size, True)
-    gentle = jb.solve(library.receding().replace({"contact.pressure": half}), contact=contact)
-    assert bool(jnp.all(gentle.touching == receding.touching))
+    gentle = from_all_nodes(library.receding().replace({"contact.pressure": half}))
+    np.testing.assert_array_equal(gentle.touching, receding.touching)
     for name in ("w", "beta", "psi", "squeeze_stress"):
-        full, twice = getattr(receding, name), 2.0 * getattr(gentle, name)
-        assert float(jnp.max(jnp.abs(twice - full))) < 1e-3 * float(jnp.max(jnp.abs(full))), name
+        full, twice = (np.asarray(getattr(run, name)) for run in (receding, gentle))
+        assert np.max(np.abs(2.0 * twice - full)) < 1e-3 * np.max(np.abs(full)), name
     # The last node in contact carries what the geometry's nonlinearity moves the end by.
-    inner = receding.touching[0].at[jnp.sum(receding.touching[0]) - 1].set(False)
-    difference = jnp.where(inner, 2.0 * gentle.reaction[0] - receding.reaction[0], 0.0)
-    assert float(jnp.max(jnp.abs(difference))) < 1e-3 * 100.0
+    inner = np.flatnonzero(receding.touching[0])[:-1]
+    np.testing.assert_allclose(
+        2.0 * gentle.reaction[0, inner], receding.reaction[0, inner], atol=1e-3 * 100.0
+    )
     assert float(gentle.contact_end[0]) == pytest.approx(float(receding.contact_end[0]), abs=1e-3)
 
 
@@ -158,46 +157,3 @@ def test_the_assumed_squeeze_strain_is_what_it_says():
     np.testing.assert_allclose(history.psi[0][inner], assumed[inner], atol=1e-9)
     assert 2.5 < float(history.contact_end[0]) < 2.52
     assert 1010.0 < float(history.reaction_max[0]) < 1040.0  # rises before the load falls
-
-
-ROUGH = {"contact.friction": 0.5, "load.amplitude": 1500.0}
-
-
-@pytest.fixture(scope="module", params=[pytest.param({}, marks=pytest.mark.slow), ROUGH])
-def clamped(request):
-    return jb.solve(library.receding_rough().replace(request.param))
-
-
-def test_friction_and_lift_balance_their_energy(clamped):
-    assert float(clamped.dissipation_loop) == pytest.approx(float(clamped.dissipation), rel=1e-3)
-    assert abs(float(clamped.closure)) < 1e-6
-    assert float(jnp.min(clamped.slip_work)) > -1e-12
-    worst = float(jnp.max(jnp.abs(clamped.energy_imbalance)))
-    assert worst < 3e-3 * float(jnp.sum(clamped.slip_work))  # of the trapezoid of F du
-
-
-def test_an_open_contact_forgets_its_traction(clamped):
-    mu = clamped.scene.contact.friction
-    open_ = ~clamped.touching
-    assert bool(jnp.any(open_ & (clamped.x < 50.9)))
-    assert float(jnp.max(jnp.abs(jnp.where(open_, clamped.traction, 0.0)))) < 1e-3
-    cap = jnp.maximum(mu * clamped.reaction, 1e-3)
-    # A node that opens or closes within a rounded corner has a little more than its friction.
-    assert float(jnp.max(jnp.abs(clamped.traction) / cap)) < 1.0 + 1e-3
-    ends = np.asarray(clamped.contact_end[1:])
-    assert np.ptp(ends) > 0.1  # it recedes and advances along the cycle
-
-
-@pytest.mark.slow
-def test_a_unilateral_end_does_not_mind_how_fine_it_is():
-    """With the lift frozen the corner goes into tension, and D drifts with the end element."""
-    thick = {"model.section": "squeeze", "load.amplitude": 0.3247}
-    sizes = {12: 68, 24: 75, 96: 91}  # H over the end element, and nodes with all others alike
-    dissipation = []
-    for parts, nodes in sizes.items():
-        scene = STRIP.replace(LINEAR | thick | {"load.cycles": 1})
-        history = jb.solve(scene.on_grid(nodes, 1.0 / parts))
-        assert float(history.reaction_min) > -1e-6
-        dissipation.append(float(history.dissipation))
-    assert abs(dissipation[0] / dissipation[1] - 1.0) < 6e-3
-    assert abs(dissipation[1] / dissipation[2] - 1.0) < 5e-3

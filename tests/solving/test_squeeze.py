@@ -1,6 +1,5 @@
 """The squeeze strain at work: laminates, Filon's layer, and a strip without a foundation."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -49,8 +48,8 @@ def squeezed():
 
 def test_the_squeeze_reaches_beyond_the_load_as_exponentials(squeezed):
     distance = np.asarray(squeezed.middles) - 50.0
-    closed = -100.0 * reference.squeeze_step(distance, DECAY)
-    assert float(jnp.max(jnp.abs(squeezed.squeeze_stress[0] - closed))) < 0.1
+    closed = -100.0 * np.asarray(reference.squeeze_step(distance, DECAY))
+    assert np.max(np.abs(squeezed.squeeze_stress[0] - closed)) < 0.1
 
 
 def test_the_squeeze_against_finite_elements(squeezed):
@@ -85,10 +84,3 @@ def test_nodal_quadrature_does_not_oscillate_and_converges():
         errors.append(np.sqrt(np.mean((stress - closed) ** 2)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(orders[1:] > 1.8), (errors, orders)
-
-
-def test_a_table_may_press_from_above_and_a_gas_from_below():
-    values = LINEAR | {"contact.bottom_pressure": 30.0, "model.nodes": 41}
-    closed = jb.solve(library.block().replace(values))
-    np.testing.assert_allclose(closed.reaction[0], 70.0, rtol=1e-9)
-    np.testing.assert_allclose(closed.squeeze_stress[0], -100.0, rtol=1e-9)
