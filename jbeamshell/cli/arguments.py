@@ -77,6 +77,7 @@ def scene_of(options: argparse.Namespace) -> Scene:
     """
     from jbeamshell.cli.dimensions import (
         OWN,
+        check_load,
         check_specimen,
         check_width,
         specimen_of,
@@ -95,10 +96,12 @@ def scene_of(options: argparse.Namespace) -> Scene:
     assigned = with_units(assigned, both, wide)
     values = overridden(both, assigned)
     check_width(str(options.scene), below, known.totals | assigned)
+    if not own:
+        check_specimen(values)
     scene = scene_from_values(values)
     options.specimen_in_si, options.scatter, options.bolted = not own, known.scatter, known.bolts
     if not own:
-        check_specimen(scene, values)
+        check_load(scene, values)
     if options.scene is not None and entry_note(values):
         notes = (*notes, f"{options.scene}: {entry_note(values)}")
     options.unsaid = "; ".join(notes)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import with_unit
 from jbeamshell.scene.dimension_table import ALL, DIMENSIONS
@@ -148,6 +149,9 @@ def check_width(where: str, below: Mapping[str, Any], given: Mapping[str, Any]) 
 
     if "strip.width" in below or given.get("strip.width") is None:
         return
+    fix = "the standard strip is for one unit of width: give a scene, or a specimen's dimensions, "
+    fix += "such as --length 120mm"
+    require("--width", given["strip.width"], bool(below) or len(given) > len(OWN), fix)
     for key in TOTALS:
         if key in below and not {key, TWINS.get(key)} & set(given):
             raise InputError(
@@ -156,12 +160,11 @@ def check_width(where: str, below: Mapping[str, Any], given: Mapping[str, Any]) 
             )
 
 
-def check_specimen(scene: Scene, values: Mapping[str, Any]) -> None:
+def check_specimen(values: Mapping[str, Any]) -> None:
     """Raise `InputError` for a specimen in SI that takes a number of the standard strip.
 
     Parameters
     ----------
-    scene : scene of the specimen
     values : values by dotted key that were given
     """
     from jbeamshell.scene.keys import DERIVED
@@ -174,6 +177,16 @@ def check_specimen(scene: Scene, values: Mapping[str, Any]) -> None:
             if option == "pressure":
                 fix += f", or --bolts {ALL['bolts'].example} --torque {ALL['torque'].example}"
             raise InputError(f"{key}: the specimen is in SI, the standard strip is not: {fix}")
+
+
+def check_load(scene: Scene, values: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a specimen in SI without a load, and propose one.
+
+    Parameters
+    ----------
+    scene : scene of the specimen
+    values : values by dotted key that were given
+    """
     if "load.amplitude" in values or scene.load.cycles == 0:
         return
     gross = float(scene.gross_slip)

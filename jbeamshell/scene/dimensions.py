@@ -215,7 +215,7 @@ def _of_size(sized: re.Match[str], texts: Mapping[str, Any], sizes: Mapping[str,
 def _check_hole(kind: str, bolt: Bolt, width: float) -> None:
     """Refuse a hole that is as wide as the plate."""
     fix = f"its hole of {bolt.holed:g} mm leaves nothing of a plate {1e3 * width:g} mm wide: "
-    require("bolts", kind, bolt.holed < 1e3 * width, f"{fix}take a smaller bolt, or give width")
+    require("bolts", kind, bolt.holed < 999.999 * width, f"{fix}take a smaller bolt, or give width")
 
 
 def _scatter(sizes: Mapping[str, float], usual: float) -> float:

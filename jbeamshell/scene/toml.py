@@ -21,6 +21,7 @@ from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.width import halves, is_total
 
+NEIGHBOURS = 4  # numbers on both sides of a total, of which one gives the same scene
 FEW_DIGITS = {4: 6, 8: 12}  # of a number that somebody wrote, by the bytes of its precision
 
 
@@ -143,7 +144,12 @@ def _total(scene: Scene, key: str, value: Any) -> Any:
         return value
     heading, name = key.split(".")
     held, value = getattr(getattr(scene, heading), name), np.asarray(value)
-    near = (_rounded(value), value, np.nextafter(value, np.inf), np.nextafter(value, -np.inf))
+    near = [_rounded(value), value]
+    for way in (np.inf, -np.inf):
+        step = value
+        for _ in range(NEIGHBOURS):
+            step = np.nextafter(step, np.asarray(way, value.dtype))
+            near.append(step)
     whole = width * halves(key, scene.member.support)
     return next((one for one in near if one * (1.0 / whole) == held), value)
 

@@ -13,12 +13,18 @@ PLANE = ["--set", "model.section=plane", "--set", "model.nodes=33"]
 
 def test_it_writes_a_joint(cli, tmp_path):
     path = tmp_path / "joint.csv"
-    words = ["--width", "30", "--units", "mm, N", "--force", "1.2", "--out", path]
-    code, out, err = cli("export", *PLANE, "--to", "table", *words)
+    scene = tmp_path / "wide.toml"
+    scene.write_text(
+        "[strip]\nwidth = 1.5\naxial_stiffness = 1e6\n[load]\nentry = 'traction'\n", "utf-8"
+    )
+    words = ["--units", "mm, N", "--force", "1.8", "--out", path]
+    code, out, err = cli("export", scene, *PLANE, "--to", "table", *words)
     assert (code, out) == (0, "")
     assert err == f"wrote {path}\n"
     assert "u in mm, F in N" in path.read_text()
-    assert float(Joint.read(path).forces[-1]) == pytest.approx(36.0)
+    joint = Joint.read(path)
+    assert float(joint.forces[-1]) == pytest.approx(1.8)
+    assert float(joint.width) == 1.5
 
 
 def test_doubts_are_one_line_each(capsys):
