@@ -261,8 +261,10 @@ def patch_width(head: float, hole: float) -> float:
     where the head is; plane elasticity spreads the pressure through the plate by itself, so that
     no cone is added.
 
-    Beside bricks of a single lap in three dimensions with such rings it is off as
-    `calibration/round_bolts.py` records.
+    Beside a single lap in three dimensions with two such rings (60 x 30 mm, plates of 8 mm, 24 x 12
+    x 2 bricks with incompatible modes on each side of the lap) it loses 3 % less at .3 of gross
+    slip and 11 % less at .6, and its secant stiffness is within .4 %.  A patch as wide as a cone of
+    30 degrees loses 25 and 21 % more, and is 4 to 5 % stiffer.
     """
     return math.sqrt(0.75 * (head**2 + hole**2))
 
