@@ -110,7 +110,7 @@ class Bolt:
     --------
     >>> bolt = Bolt("M8", "8.8", torque="25 N m")
     >>> round(bolt.preload), [round(force) for force in bolt.interval]
-    (19036, [14643, 23429])
+    (19006, [14620, 23392])
     """
 
     size: str = "M8"
@@ -227,7 +227,7 @@ class Bolt:
         Examples
         --------
         >>> Bolt("M8", torque="25 N m").rows([30.0, 70.0]).round(1).tolist()
-        [[30.0, 19036.1, 12.7], [70.0, 19036.1, 12.7]]
+        [[30.0, 19006.3, 12.7], [70.0, 19006.3, 12.7]]
         """
         require("unit", unit, unit in ("mm", "m"), "choose 'mm' or 'm'")
         width = self.patch * (1.0 if unit == "mm" else 1e-3)
