@@ -33,11 +33,14 @@ from .history.contact_history import ContactHistory as ContactHistory
 from .history.history import History as History
 from .history.read_history import read_history as read_history
 from .solving.advice import Advice as Advice, advise as advise
+from .solving.lap_joint import LapJoint as LapJoint
+from .solving.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
 from .solving.solve import solve as solve
 from .measured.inspection import Inspection as Inspection, inspect as inspect
 from .numerics.newton import Newton as Newton
 from .solving.response import response as response
 from .scene import library as library
+from .scene.bolts import Bolt as Bolt
 from .scene.parts import (
     Contact as Contact,
     Load as Load,

@@ -114,7 +114,7 @@ def beam(
     ends = LENGTH * jnp.array([0.0, 1.0]), PRESSURE * jnp.stack([2.0 - edge, edge])
     pressed = scene.replace({"contact.pressure": jnp.stack(ends, axis=1)})
     force = reach * FRICTION * PRESSURE * LENGTH
-    joint = dynamics.Joint.of(pressed, force, width=numbers["width"])
+    joint = dynamics.Joint.of(pressed, force).times(numbers["width"])
     held = dynamics.Attachment(joint.in_series(numbers["spring"]), 0)
     mass = jnp.reshape(numbers["mass"], (1, 1))
     return dynamics.Structure(mass, [[0.0]], [held], damping_ratio=numbers["damping_ratio"])

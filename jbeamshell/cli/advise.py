@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from jbeamshell.cli.arguments import add_json, add_scene, add_settings, add_tolerance, scene_of
+from jbeamshell.cli.dimensions import add_dimensions
 from jbeamshell.cli.terminal import put
 
 
@@ -18,6 +19,7 @@ def add_to(commands: Any) -> None:
         "elasticity, and why, without solving it.",
     )
     add_scene(parser)
+    add_dimensions(parser, lap=True)
     add_tolerance(parser)
     add_settings(parser)
     add_json(parser)

@@ -75,17 +75,33 @@ def scene_of(options: argparse.Namespace) -> Scene:
 
     What its file leaves unsaid is kept as ``options.unsaid``, to be said at the end.
     """
-    from jbeamshell.cli.dimensions import check_specimen, specimen_of, with_units
+    from jbeamshell.cli.dimensions import (
+        OWN,
+        check_load,
+        check_specimen,
+        check_width,
+        specimen_of,
+        with_units,
+    )
     from jbeamshell.scene import library
+    from jbeamshell.scene.dimensions import KEYS
     from jbeamshell.scene.toml import entry_note, overridden, scene_from_values
 
     below = {} if options.scene is None else library.values_from(options.scene)
-    known, width, notes = specimen_of(options)
-    below = overridden(below, known)
-    values = overridden(below, with_units(assignments(options.set), below, width))
+    known = specimen_of(options)
+    notes, own = known.notes, set(known.totals) <= {KEYS[name] for name in OWN}
+    both = overridden(below, known.totals)
+    assigned = assignments(options.set)
+    wide = below.get("strip.width", known.width)
+    assigned = with_units(assigned, both, wide)
+    values = overridden(both, assigned)
+    check_width(str(options.scene), below, known.totals | assigned)
+    if not own:
+        check_specimen(values)
     scene = scene_from_values(values)
-    if known:
-        check_specimen(scene, values, width)
+    options.specimen_in_si, options.scatter, options.bolted = not own, known.scatter, known.bolts
+    if not own:
+        check_load(scene, values)
     if options.scene is not None and entry_note(values):
         notes = (*notes, f"{options.scene}: {entry_note(values)}")
     options.unsaid = "; ".join(notes)

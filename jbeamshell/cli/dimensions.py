@@ -3,36 +3,42 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import with_unit
-from jbeamshell.scene.dimension_table import DIMENSIONS
+from jbeamshell.scene.dimension_table import ALL, DIMENSIONS
 
 if TYPE_CHECKING:
     from jbeamshell.scene.dimensions import Dimensions
     from jbeamshell.scene.scene import Scene
 
-# Base units of the numbers of a scene in SI, by the table of keys; a force has its width too.
+# Base units of the numbers of a scene in SI, by the table of keys; of a force with a width, too.
 SI = {"length": "m", "stress": "Pa", "1/length": "1/m", "force/width": "N/m"}
+SI |= {"force/width/length": "Pa", "force": "N", "force/length": "N/m", "force length": "J"}
 NEEDED = {
     "strip.length": "length",
     "strip.height_ratio": "thickness",
     "strip.axial_stiffness": "modulus",
     "contact.pressure": "pressure",
 }
+OWN = ("width", "force", "friction")  # which have the scene's own units where nothing else is given
 PART = 0.5  # part of gross slip of an amplitude that is proposed
 
 
-def add_dimensions(parser: argparse.ArgumentParser) -> None:
-    """Add the options to a parser."""
-    group = parser.add_argument_group(
-        "specimen", "dimensions with units; the scene is then in SI, forces per metre of width"
-    )
-    for name, (_, example, text) in DIMENSIONS.items():
-        group.add_argument(f"--{name}", metavar=example.upper(), help=text)
+def add_dimensions(parser: argparse.ArgumentParser, *, lap: bool = False) -> None:
+    """Add the options to a parser; ``lap`` adds those of a lap joint and its load."""
+    words = "dimensions with units; the scene is then in SI, and forces are totals of the width"
+    if not lap:
+        words = "dimensions with units; the scene is then in SI, forces per metre of width"
+    group = parser.add_argument_group("specimen", words)
+    for name, (_, example, text) in (ALL if lap else DIMENSIONS).items():
+        option = f"--{name.replace('_', '-')}"
+        group.add_argument(option, metavar=example.upper(), help=text)
     group.add_argument(
         "--specimen", metavar="FILE.toml", help="file with such entries; options override them"
     )
@@ -40,44 +46,56 @@ def add_dimensions(parser: argparse.ArgumentParser) -> None:
 
 def dimensions(options: argparse.Namespace) -> dict[str, Any]:
     """Entries ``dimensions`` and ``width`` of a specimen's table, as far as they are given."""
-    from jbeamshell.common.files import read_toml
-
-    given = {} if options.specimen is None else read_toml(Path(options.specimen))
-    given |= {name: text for name in DIMENSIONS if (text := getattr(options, name)) is not None}
+    given = _given(options, DIMENSIONS)
     if set(given) == {"width"}:
         return {"width": width(given["width"])}
     return {"dimensions": given} if given else {}
 
 
+def _given(options: argparse.Namespace, names: Mapping[str, Any]) -> dict[str, Any]:
+    """Texts of the file and the options by name."""
+    from jbeamshell.common.files import read_toml
+
+    given = {} if options.specimen is None else read_toml(Path(options.specimen))
+    return given | {
+        name: text for name in names if (text := getattr(options, name, None)) is not None
+    }
+
+
 def width(text: str) -> float:
     """Width from an option: with a unit in metres, a number alone in the data's own unit."""
-    from jbeamshell.scene.dimensions import quantity
+    return _own("--width", text, "width")
 
-    try:
+
+def _own(name: str, text: str, dimension: str) -> float:
+    """Number of an option in the scene's own unit, or with a unit in SI."""
+    from jbeamshell.scene.quantities import quantity
+
+    with contextlib.suppress(ValueError):
         return float(text)
-    except ValueError:
-        return quantity("--width", text, *DIMENSIONS["width"][:2])
+    return quantity(name, text, *ALL[dimension][:2])
 
 
 def specimen_of(options: argparse.Namespace) -> Dimensions:
-    """Dimensions in SI that the options give."""
-    from jbeamshell.scene.dimensions import dimensions_of
+    """Dimensions that the options give: in SI, or a width, force and friction in own units."""
+    from jbeamshell.scene.dimensions import KEYS, Dimensions, dimensions_of
 
-    given = dimensions(options) if hasattr(options, "specimen") else {}  # some take none
-    known = dimensions_of(given.get("dimensions", {}))
-    return known._replace(width=given.get("width", known.width))
+    given = _given(options, ALL) if hasattr(options, "specimen") else {}  # some take none
+    if given and set(given) <= set(OWN):
+        return Dimensions({KEYS[name]: _own(f"--{name}", t, name) for name, t in given.items()})
+    return dimensions_of(given)
 
 
 def with_units(
     values: Mapping[str, Any], below: Mapping[str, Any], width_of_all: float | None
 ) -> dict[str, Any]:
-    """Values of which texts such as "4kN" are numbers in SI, forces per width.
+    """Values of which texts such as "4kN" are numbers in SI.
 
     Parameters
     ----------
     values : values by dotted key, as the command line gives them
     below : values of the scene that they override, which tell what the amplitude is
-    width_of_all : width [m] by which forces are divided; None if it is not known
+    width_of_all : width [m], of which forces are totals; None if it is not known
     """
     return {
         key: _in_si(key, value, {**below, **values}, width_of_all)
@@ -90,8 +108,8 @@ def with_units(
 def _in_si(key: str, text: str, values: Mapping[str, Any], width_of_all: float | None) -> Any:
     """Number in SI from a text with a unit; other texts and keys as they are."""
     from jbeamshell.measured.columns import factor_of
-    from jbeamshell.scene.dimensions import QUANTITY
     from jbeamshell.scene.keys import LENGTHS, NUMBERS, TABLE
+    from jbeamshell.scene.quantities import QUANTITY
 
     found = QUANTITY.fullmatch(text)
     if key not in NUMBERS or found is None or found[2] is None:
@@ -101,47 +119,80 @@ def _in_si(key: str, text: str, values: Mapping[str, Any], width_of_all: float |
         kind = "length"
     base = SI.get(kind)
     factor = None if base is None else factor_of(found[2], (base,))
-    if factor is None and kind == "force/width" and (newtons := factor_of(found[2], ("N",))):
-        if width_of_all is None:
+    if "/width" in kind:
+        whole = SI[kind.replace("/width", "")]
+        total = factor_of(found[2], (whole,))
+        if width_of_all is not None:
+            base = whole
+            factor = total if factor is None or total is not None else factor * width_of_all
+        elif factor is None and total is not None:
             raise InputError(
                 f"{key} = {text!r}: forces are per width: give --width too, such as --width 50mm, "
                 "or write a force per width, such as 80kN/m"
             )
-        factor = newtons / width_of_all
     if factor is None:
         fix = f"{found[2][:20]!r} is no unit of it: write {base}" if base else "takes no unit"
         raise InputError(f"{key} = {text!r}: {fix}")
     return float(found[1]) * factor
 
 
-def check_specimen(scene: Scene, values: Mapping[str, Any], width_of_all: float | None) -> None:
+def check_width(where: str, below: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a width given to a scene whose forces were said without one.
+
+    Parameters
+    ----------
+    where : name of the scene, or its file
+    below : values by dotted key of that scene
+    given : values by dotted key that override them
+    """
+    from jbeamshell.scene.keys import TOTALS, TWINS
+
+    if "strip.width" in below or given.get("strip.width") is None:
+        return
+    fix = "the standard strip is for one unit of width: give a scene, or a specimen's dimensions, "
+    fix += "such as --length 120mm"
+    require("--width", given["strip.width"], bool(below) or len(given) > len(OWN), fix)
+    for key in TOTALS:
+        if key in below and not {key, TWINS.get(key)} & set(given):
+            raise InputError(
+                f"{key} = {below[key]!r}: is per unit of width in {where}, and a total with "
+                "strip.width: give it too, or write strip.width and totals into the scene"
+            )
+
+
+def check_specimen(values: Mapping[str, Any]) -> None:
     """Raise `InputError` for a specimen in SI that takes a number of the standard strip.
 
     Parameters
     ----------
-    scene : scene of the specimen
     values : values by dotted key that were given
-    width_of_all : width [m] by which forces are divided; None if it is not known
     """
     from jbeamshell.scene.keys import DERIVED
-    from jbeamshell.scene.pressure import resultant
 
     said = {DERIVED.get(key, key) for key in values}
     said |= {"strip.axial_stiffness"} if "strip.layers" in said else set()
     for key, option in NEEDED.items():
         if key not in said:
-            fix = f"give it, such as --{option} {DIMENSIONS[option].example}"
+            fix = f"give it, such as --{option} {ALL[option].example}"
+            if option == "pressure":
+                fix += f", or --bolts {ALL['bolts'].example} --torque {ALL['torque'].example}"
             raise InputError(f"{key}: the specimen is in SI, the standard strip is not: {fix}")
+
+
+def check_load(scene: Scene, values: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a specimen in SI without a load, and propose one.
+
+    Parameters
+    ----------
+    scene : scene of the specimen
+    values : values by dotted key that were given
+    """
     if "load.amplitude" in values or scene.load.cycles == 0:
         return
-    contact = scene.contact
-    pressing, _ = resultant(
-        contact.pressure, contact.bottom_pressure, scene.strip.length, scene.member.support
-    )
-    gross = float(contact.friction) * float(pressing)
-    wide, unit = (1.0, "N/m") if width_of_all is None else (width_of_all, "N")
-    half = with_unit(PART * wide * gross, unit, 3).replace(" ", "")
+    gross = float(scene.gross_slip)
+    unit = "N/m" if scene.strip.width is None else "N"
+    half = with_unit(PART * gross, unit, 3).replace(" ", "")
     raise InputError(
         "load.amplitude: is not given, and the specimen slides at mu F_N L = "
-        f"{with_unit(wide * gross, unit)}: give a part of it, such as --set load.amplitude={half}"
+        f"{with_unit(gross, unit)}: give a part of it, such as --set load.amplitude={half}"
     )

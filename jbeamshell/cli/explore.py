@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from jbeamshell.cli.arguments import add_scene, add_settings, scene_of
+from jbeamshell.cli.dimensions import add_dimensions
 from jbeamshell.cli.terminal import put, say
 
 MOST = 65535  # largest number of a port
@@ -22,6 +23,7 @@ def add_to(commands: Any) -> None:
         epilog="Needs Panel: pip install 'jbeamshell[explore]'.",
     )
     add_scene(parser)
+    add_dimensions(parser, lap=True)
     parser.add_argument(
         "--data", action="append", default=[], metavar="CSV", help="measured loops to draw over"
     )

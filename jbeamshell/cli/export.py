@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from jbeamshell.cli.arguments import add_scene, add_settings, scene_of
+from jbeamshell.cli.dimensions import add_dimensions
 from jbeamshell.cli.terminal import doubts_in_lines, say_written
 
 FILES = {
@@ -29,15 +30,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--to", required=True, choices=tuple(FILES), help="program, or kind of file"
     )
-    parser.add_argument(
-        "--force",
-        type=float,
-        metavar="F",
-        help="largest end force per width (default: load.amplitude)",
-    )
-    parser.add_argument(
-        "--width", type=float, default=1.0, metavar="W", help="width of the strip (default 1)"
-    )
+    add_dimensions(parser, lap=True)
     parser.add_argument(
         "--units",
         default="length,force",
@@ -55,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from jbeamshell.dynamics.structure.joint import Joint
 
     with doubts_in_lines():
-        joint = Joint.of(scene_of(options), options.force, width=options.width)
+        joint = Joint.of(scene_of(options))
         path = FILES[options.to] if options.out is None else options.out
         units = tuple(word.strip() for word in options.units.split(","))
         written = joint.export(options.to, path, units=units)

@@ -17,7 +17,7 @@ from jbeamshell.cli.arguments import (
     add_tolerance,
     scene_of,
 )
-from jbeamshell.cli.dimensions import add_dimensions
+from jbeamshell.cli.dimensions import SI, add_dimensions
 from jbeamshell.cli.terminal import put, say, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning
 
@@ -35,7 +35,7 @@ def add_to(commands: Any) -> None:
     )
     add_scene(parser)
     add_tolerance(parser)
-    add_dimensions(parser)
+    add_dimensions(parser, lap=True)
     add_settings(parser)
     add_folder(parser)
     add_json(parser)
@@ -48,6 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from jbeamshell.scene import load_path
     from jbeamshell.solving import solve as solving
     from jbeamshell.solving.advice import within
+    from jbeamshell.solving.sensitivity import is_bolted, sensitivity
 
     scene = within(scene_of(options), options.tol)
     load_path.check(scene)
@@ -68,9 +69,15 @@ def run(options: argparse.Namespace) -> int:
     finished = time.perf_counter()
     timing = {"wall_s": finished - compiled, "compile_s": compiled - begin}
     figures = history.figures() | timing
+    units = SI if options.specimen_in_si else {}
+    lines = [*options.bolted, history.summary(units).as_text()]
+    if is_bolted(scene) and scene.member.support != "none":
+        found = sensitivity(history, options.scatter)
+        figures |= found.figures()
+        lines.append(found.summary(*("N", "J", "m") * options.specimen_in_si).as_text())
     for doubt in history.doubts:
         warn(doubt)
-    put(files.as_json(figures) if options.json else f"{history}\n")
+    put(files.as_json(figures) if options.json else "\n".join(lines) + "\n")
     if folder is not None:
-        say_written(report.write_run(folder, history, figures))
+        say_written(report.write_run(folder, history, figures, units))
     return 0

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from jbeamshell.cli.arguments import add_json, add_scene, add_settings, scene_of
+from jbeamshell.cli.dimensions import add_dimensions
 from jbeamshell.cli.terminal import UNCONVERGED, put, say, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning, InputError
 from jbeamshell.common.files import as_path
@@ -36,6 +37,7 @@ def add_to(commands: Any) -> None:
         "combination of values is one lane: one strip of the sweep.",
     )
     add_scene(parser)
+    add_dimensions(parser, lap=True)
     parser.add_argument(
         "--over",
         action="append",

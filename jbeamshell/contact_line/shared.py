@@ -30,11 +30,12 @@ from jbeamshell.contact_line.kept import alike
 from jbeamshell.contact_line.solve import strip_of
 from jbeamshell.contact_line.strip import Strip
 from jbeamshell.history.history import FIGURES
+from jbeamshell.scene.keys import WIDTH_OF_ALL
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 
 LOADS = frozenset({"load.amplitude", "contact.friction"})
-SCALES = frozenset({"contact.pressure", "strip.length", "strip.axial_stiffness"})
+SCALES = frozenset({"contact.pressure", "strip.length", "strip.axial_stiffness", WIDTH_OF_ALL})
 HEIGHTS = frozenset({HEIGHT, "strip.half_height"})
 OF_CONTACT = frozenset({*FIGURES, "dissipation_error", "force", "displacement", "status"})
 """Figures that need no field above the contact."""

@@ -16,7 +16,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require, require_number
+from jbeamshell.common.checks import require
 from jbeamshell.common.jax_options import ONCE
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.laws.iwan4 import Iwan4
@@ -39,7 +39,7 @@ class FourParameters(Tree):
 
     Attributes
     ----------
-    law : model; forces are those of the whole width
+    law : model; forces are per unit of width, or totals where the scene has a width
     force, displacement, dissipation : (k,) amplitudes and energies of the joint's steady cycles
     mounting : how a lap joint is held and loaded, in words; empty for anything else
     """
@@ -80,14 +80,13 @@ class FourParameters(Tree):
         )
 
 
-def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters:
+def four_parameters(scene: Scene | Law) -> FourParameters:
     """Four-parameter Iwan model of a strip or lap joint, fitted to no test but to its geometry.
 
     Parameters
     ----------
     scene : scene, whose load is not used; take ``model.section = plane`` for elasticity's figures.
         Or a law, such as a `Joint`, whose own loops count
-    width : of the strip, by which forces and energies are multiplied
 
     Raises
     ------
@@ -101,16 +100,15 @@ def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters
     --------
     >>> print(jb.dynamics.four_parameters(jb.Scene()))
     """
-    require_number("width", width)
     found = _of_law(scene) if isinstance(scene, Law) else _of_scene(scene)
     mounting = getattr(scene, "mounting", "") if isinstance(scene, Law) else in_words(scene)
     limit, stiffest, force, u, loss = found
-    f, d = width * force, width * loss
-    return FourParameters(_nearest(width * limit, width * stiffest, f, u, d), f, u, d, mounting)
+    law = _nearest(limit, stiffest, force, u, loss)
+    return FourParameters(law, force, u, loss, mounting)
 
 
 def _of_scene(scene: Scene) -> tuple[Any, ...]:
-    """Gross slip, largest stiffness, and curves of force, displacement and energy, per width."""
+    """Gross slip, largest stiffness, and curves of force, displacement and energy."""
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
     fix = "must be 'force': a moment has no gross slip"

@@ -70,8 +70,9 @@ def _controls(scene: Scene) -> Iterator[Control]:
 
 def _load(scene: Scene) -> Control:
     """Control of the amplitude, below gross slip where a force is controlled."""
-    key, amplitude = "load.amplitude", float(scene.load.amplitude)
-    label = f"Load amplitude A [{unit_of(key, scene.load)}]"
+    key, whole = "load.amplitude", scene.strip.width is not None
+    amplitude = float(scene.get(key))
+    label = f"Load amplitude A [{unit_of(key, scene.load, whole)}]"
     limit = largest_force(scene)
     if scene.load.control != "force" or not math.isfinite(limit):
         return _around(key, label, amplitude)
@@ -86,7 +87,8 @@ def _pressure(scene: Scene) -> Iterator[Control]:
     if rows is not None:
         for number, (place, force, width) in enumerate(rows.tolist(), 1):
             name = f"Bolt {number}" if len(rows) > 1 else "Bolt"
-            label = f"{name}: force [force/width]"
+            unit = "force/width" if scene.strip.width is None else "force"
+            label = f"{name}: force [{unit}]"
             yield _around(BOLT.format(number, "force"), label, force)
             low, high = 0.5 * width, length - 0.5 * width
             if high > low:
@@ -108,7 +110,7 @@ def bolts_of(scene: Scene) -> np.ndarray | None:
     clamped = scene.member.support == "clamped"
     below = np.asarray(contact.pressure if clamped else 0.0)
     same = np.array_equal(np.asarray(contact.bottom_pressure), below)
-    return np.array(contact.bolts, dtype=float) if same else None
+    return np.array(scene.get("contact.bolts"), dtype=float) if same else None
 
 
 def largest_force(scene: Scene) -> float:

@@ -44,11 +44,15 @@ class Figures:
     Parameters
     ----------
     load : load of the scene, for what the figures hold and their labels
+    whole : True where forces are totals, those of the scene's width
     """
 
-    def __init__(self, load: Load) -> None:
+    def __init__(self, load: Load, whole: bool = False) -> None:
         self.cyclic, self._turns = bool(load.cycles), load.kind == "moment"
         self._load, self._moved = LABELS[load.kind]
+        self._work = "force"
+        if whole:
+            self._load, self._work = self._load.replace("/width", ""), "force length"
         self._sources: dict[str, ColumnDataSource] = {}
         self._factor = 0.0
         self._view: View | None = None
@@ -146,7 +150,7 @@ class Figures:
         words = (
             "Dissipation over amplitude",
             "amplitude A of the load",
-            "D, work per cycle  [force]",
+            f"D, work per cycle  [{self._work}]",
         )
         made = self._new(*words, x_axis_type="log", y_axis_type="log")
         look = {"line_color": KEPT, "line_width": 2, "line_dash": "dashed"}
@@ -207,7 +211,7 @@ class Figures:
             self.loop.title.text = f"Hysteresis loop: D = {view.figures['dissipation']:.4g}"
             self._fit_loop()
             self._show_states(view, x)
-            amplitude = float(scene.load.amplitude)
+            amplitude = float(scene.get("load.amplitude"))
             work = view.figures["dissipation"]
             some = [amplitude] if work > 0.0 else []
             self.put("point", A=some, D=[work] * len(some))

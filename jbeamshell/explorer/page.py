@@ -17,6 +17,7 @@ from jbeamshell.common.summary import in_words
 from jbeamshell.explorer.controls import controls_of, scene_at
 from jbeamshell.explorer.figures import Figures
 from jbeamshell.explorer.views import FIGURES, View, curve_of, drawable, view_of
+from jbeamshell.history.figures import units_of
 from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene import library, mounting
@@ -154,7 +155,7 @@ class Page:
         self._controls = controls_of(self._start)
         self._values = {control.name: control.value for control in self._controls}
         self.scene, self.view, self.message = scene, None, ""
-        self._figures = Figures(scene.load)
+        self._figures = Figures(scene.load, scene.strip.width is not None)
         for each in (self._moment, self._keep, self._data):
             each.visible = bool(scene.load.cycles)
         self._keep.value = False
@@ -286,7 +287,9 @@ class Page:
 
     def _show_numbers(self, view: View) -> None:
         parts = []
-        for key, (name, unit) in FIGURES.items():
+        units = units_of(self.scene)
+        for key, name in FIGURES.items():
+            unit = units.get(key, "1")
             if key in view.figures:
                 value = html.escape(in_words(view.figures[key]))
                 parts.append(f"<div>{name} <b>{value}</b> <span>[{unit}]</span></div>")

@@ -24,11 +24,11 @@ CURVE = np.geomspace(0.05, 0.95, 9)  # amplitudes of the dissipation, in parts o
 CURVE_STEPS = 20  # per half cycle of the curve, of a strip that is solved in load steps
 LARGEST = 2.0  # of the scene's amplitude, where gross slip does not limit it
 FIGURES = {
-    "dissipation": ("Dissipation D", "force"),
-    "loss_factor": ("Loss factor", "1"),
-    "secant_stiffness": ("Secant stiffness", "force/width/length"),
-    "peak_displacement": ("Largest u(L)", "length"),
-    "slip_length": ("Slip length", "length"),
+    "dissipation": "Dissipation D",
+    "loss_factor": "Loss factor",
+    "secant_stiffness": "Secant stiffness",
+    "peak_displacement": "Largest u(L)",
+    "slip_length": "Slip length",
 }
 
 
@@ -113,7 +113,7 @@ def curve_of(scene: Scene) -> Curve:
     curve.
     """
     limit = largest_force(scene) if scene.load.control == "force" else np.inf
-    own = LARGEST * float(scene.load.amplitude)
+    own = LARGEST * float(scene.get("load.amplitude"))
     amplitudes = CURVE * (limit if np.isfinite(limit) else own)
     half = 1 if scene.plan.on_contact_line else CURVE_STEPS
     history = run(scene, _growing(amplitudes, half), throw=False)

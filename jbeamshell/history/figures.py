@@ -13,8 +13,9 @@ from jbeamshell.history.error_estimates import SlipCycle, estimates
 from jbeamshell.history.loop_figures import LoopFigures
 from jbeamshell.history.record import Record
 from jbeamshell.mechanics.bar import cubic_law, lap_cubic_law
+from jbeamshell.scene.scene import Scene
 
-UNITS = {  # of the figures that are no pure numbers, in words
+UNITS = {  # of the figures that are no pure numbers, in words; forces are per unit of width
     **dict.fromkeys(("dissipation", "dissipation_loop"), "force"),
     **dict.fromkeys(("peak_displacement", "slip_length", "tip_deflection"), "length"),
     **dict.fromkeys(("contact_end", "reaction_max_at"), "length"),
@@ -23,6 +24,17 @@ UNITS = {  # of the figures that are no pure numbers, in words
     "curvature": "1/length",
 }
 TURNED_UNITS = {"peak_displacement": "rad", "secant_stiffness": "force"}  # under a moment
+TOTAL_UNITS = {  # of a joint with a width
+    **dict.fromkeys(("dissipation", "dissipation_loop"), "force length"),
+    "secant_stiffness": "force/length",
+}
+
+
+def units_of(scene: Scene) -> dict[str, str]:
+    """Units of the figures of a scene by name, without those of pure numbers."""
+    turned, whole = scene.load.kind == "moment", scene.strip.width is not None
+    units = UNITS | (TURNED_UNITS if turned else {}) | (TOTAL_UNITS if whole else {})
+    return units | {"secant_stiffness": "force length"} if turned and whole else units
 
 
 class CycleFigures(Record, LoopFigures):
@@ -45,17 +57,18 @@ class CycleFigures(Record, LoopFigures):
         scene, force = self.scene, self.loop[0]
         if scene.load.kind == "moment":
             return self._numbers.full_like(self.dissipation, self._numbers.nan)
-        stiffness, friction = scene.strip.stretching_stiffness, self.friction_per_length
+        wide, friction = scene.wide, self.friction_per_length
+        stiffness = wide * scene.strip.stretching_stiffness
         amplitude = 0.5 * (self._numbers.max(force) - self._numbers.min(force))
         if scene.member.support == "none":
             return self.dissipation / cubic_law(amplitude, stiffness, friction)
-        lower = scene.member.beside(scene.strip).stretching_stiffness
+        lower = wide * scene.member.beside(scene.strip).stretching_stiffness
         return self.dissipation / lap_cubic_law(amplitude, stiffness, lower, friction)
 
     @property
     @quiet
     def friction_per_length(self) -> Array:
-        """Mean q of mu F_N where the strip is pressed, force per length and width."""
+        """Mean q of mu F_N where the strip is pressed, force per length."""
         # Weighted by the pressure itself, so that unloaded parts do not count.
         mean = self._numbers.sum(self.load**2 / self.tributary) / self._numbers.sum(self.load)
         return self.scene.contact.friction * mean
@@ -95,7 +108,7 @@ class CycleFigures(Record, LoopFigures):
             friction=self.scene.contact.friction,
             slip_stiffness=self.scene.slip_stiffness(self.tributary),
             half_height=self.scene.strip.half_height,
-            dissipation=work if line else None,
+            dissipation=work / self.scene.wide if line else None,
         )
 
     @functools.cached_property

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Self
 
 import jax
@@ -12,9 +14,9 @@ from jax import Array
 from jbeamshell.common.errors import Status
 from jbeamshell.common.frames import frame
 from jbeamshell.common.numbers_of import quiet
-from jbeamshell.common.summary import Summary, in_words
+from jbeamshell.common.summary import Summary, in_words, with_unit
 from jbeamshell.history.contact_line import ContactLine
-from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
+from jbeamshell.history.figures import CycleFigures, units_of
 from jbeamshell.history.profiles import Profiles
 from jbeamshell.history.reliability import doubts_of_run
 from jbeamshell.history.saved import write_history
@@ -39,8 +41,9 @@ class History(Profiles, ContactLine, CycleFigures):
 
     Its arrays are the attributes of `Record`.  Figures are properties: those of `Profiles` along X,
     of `ContactLine` at every step, of `CycleFigures` for the last cycle, and those below.  Units
-    are those of the scene; forces, works and stiffnesses are per unit width.  A run on the contact
-    line has arrays of NumPy, and within a transformation those of JAX.
+    are those of the scene; forces, works and stiffnesses are per unit width, or totals where the
+    scene has a ``strip.width``.  A run on the contact line has arrays of NumPy, and within a
+    transformation those of JAX.
 
     Examples
     --------
@@ -92,7 +95,9 @@ class History(Profiles, ContactLine, CycleFigures):
         turned = self.scene.load.kind == "moment"  # which no bar can be
         of_cycle = [name for name in FIGURES if not (turned and name == "dissipation_ratio")]
         names = (*(of_cycle if self.cycles else ()), *self._contact_figures)
-        read = self.but(above=self.above.found, scene=self.scene.in_one_form())
+        one = self.scene.in_one_form()
+        one = one.but(strip=one.strip.but(width=self.scene.strip.width))
+        read = self.but(above=self.above.found, scene=one)
         plain = jax.tree.map(np.asarray, read)
         values = {name: float(np.ravel(getattr(plain, name))[-1]) for name in names}
         figures: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
@@ -114,8 +119,14 @@ class History(Profiles, ContactLine, CycleFigures):
             names += ("reaction_max", "reaction_max_at")
         return (*names, "squeeze_stress_max") if "psi" in fields else names
 
-    @property
-    def _summary(self) -> Summary:
+    def summary(self, named: Mapping[str, str] = MappingProxyType({})) -> Summary:
+        """Figures in lines.
+
+        Parameters
+        ----------
+        named : names of the scene's units by words such as "length" or "force length", with which
+            numbers get prefixes; without them numbers and these words are printed
+        """
         strip, control = self.scene.strip, self.scene.load.control
         driver = np.asarray(self.force if control == "force" else self.displacement)
         if self.scene.load.kind == "moment":
@@ -124,6 +135,8 @@ class History(Profiles, ContactLine, CycleFigures):
         pulled = bool(self.cycles or np.any(driver))
         if not pulled:
             what = f"pressed by {float(np.sum(self.load)):.4g}"
+        if strip.width is not None:
+            what += f", width {float(strip.width):.4g} in plane {strip.plane}"
         title = (
             f"{self.force.size} levels, eta = {float(strip.height_ratio):.4g}, {what}: "
             f"{self.scene.plan}"
@@ -136,24 +149,20 @@ class History(Profiles, ContactLine, CycleFigures):
         entered = section_error.in_words(self.scene, figures.get("slip_length")) if pulled else ""
         mounted = figures.pop("mounting", "")
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
-        turned = self.scene.load.kind == "moment"
-        units = UNITS | TURNED_UNITS if turned else UNITS
+        units = units_of(self.scene)
         rows = [
-            (
-                name.replace("_", " "),
-                in_words(value) + (f"  [{units[name]}]" if name in units else ""),
-            )
+            (name.replace("_", " "), _with_unit(value, units.get(name, ""), named))
             for name, value in figures.items()
         ]
         return Summary("\n".join(filter(None, (title, chosen, entered, mounted))), rows, doubts)
 
     def __str__(self) -> str:
-        return self._summary.as_text()
+        return self.summary().as_text()
 
     def _repr_html_(self) -> str:
         from jbeamshell import plotting
 
-        return self._summary.as_html(plotting.thumbnail(self.plot()))
+        return self.summary().as_html(plotting.thumbnail(self.plot()))
 
     def table(self) -> dict[str, np.ndarray]:
         """Columns (steps+1,) of the load path by name.
@@ -225,8 +234,21 @@ class History(Profiles, ContactLine, CycleFigures):
 
         return plotting.deformed(self, step, axes, **options)
 
+    def plot_joint(self, step: int | None = None, axes: Any = None) -> Any:
+        """Draw a lap joint, its loop, slip and pressure; see `jbeamshell.plotting.lap_joint`."""
+        from jbeamshell import plotting
+
+        return plotting.lap_joint(self, step, axes)
+
     def animate(self, steps: Any = None, **options: Any) -> Any:
         """Film of the last cycle, to be saved as a GIF; see `jbeamshell.plotting.animate`."""
         from jbeamshell import plotting
 
         return plotting.animate(self, steps, **options)
+
+
+def _with_unit(value: Any, unit: str, named: Mapping[str, str]) -> str:
+    """Figure with its unit, by its name where there is one."""
+    if unit in named and isinstance(value, float):
+        return with_unit(value, named[unit], 6)
+    return in_words(value) + (f"  [{unit}]" if unit else "")

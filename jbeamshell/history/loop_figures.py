@@ -56,7 +56,7 @@ class LoopFigures:
 
     @property
     def dissipation(self) -> Array:
-        """Work of friction in the last cycle, D, per unit width."""
+        """Work of friction in the last cycle, D."""
         start, _, stop = self._last
         return self._numbers.sum(self.slip_work[start + 1 : stop + 1])
 

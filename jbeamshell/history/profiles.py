@@ -42,7 +42,7 @@ class Profiles(Record):
     @property
     def squeeze_stress(self) -> Array:
         """Mean of sigma_y over the height, chi/(2H), (steps+1, elements); compression negative."""
-        return self.sections.psi / (2.0 * self.scene.strip.half_height)
+        return self.above.found.sections.psi / (2.0 * self.scene.strip.half_height)
 
     @property
     def squeeze_stress_max(self) -> Array:

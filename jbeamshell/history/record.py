@@ -31,7 +31,10 @@ class Above(NamedTuple):
 
 
 class Record(Tree):
-    """Arrays of a load path; units are those of the scene, and forces are per unit width.
+    """Arrays of a load path; units are those of the scene.
+
+    Forces, works and what is made of them are per unit of width, or totals where the scene has a
+    ``strip.width``.  Stresses, such as ``traction`` and ``reaction``, and fields are what they are.
 
     Step 0 is the first pressure step; with ``load.pressure_steps`` = 1 that is the strip under the
     whole pressure, before any load.  A step that did not converge and all after it hold NaN.
@@ -113,7 +116,17 @@ class Record(Tree):
     def sections(self) -> Strains:
         """Section forces in the places of their strains, (steps+1, elements) each."""
         sections: Strains = self.above.found.sections
-        return sections
+        width = self.scene.strip.width
+        return sections if width is None else Strains(*(width * s for s in sections))
+
+    def of_scene(self, scene: Scene) -> Self:
+        """Record of one unit of width as that of a scene, with totals where it has a width."""
+        if scene.strip.width is None:
+            return self.but(scene=scene)
+        names = ["force", "load", "slip_work", "stored_energy", "sinking"]
+        names += ["target"] * (scene.load.control == "force")
+        found = {name: scene.wide * getattr(self, name) for name in names}
+        return self.but(scene=scene, **found)
 
     @property
     def member(self) -> Array | None:

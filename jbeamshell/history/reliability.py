@@ -117,7 +117,7 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
         if swayed > 0.0:
             bends = f", and the load is {100.0 * swayed:.2g} % of what buckles the joint"
         found.append(f"{_off(error)}: kinematics are linear{bends}; {_exact(scene, ALLOW)}")
-    found += _buckling(scene)
+    found += [*_buckling(scene), *_wide(scene)]
     bent = OVERSHOOT / scene.plan.steps
     if scene.load.control == ARC_LENGTH and bent > allowed:
         found.append(
@@ -125,6 +125,24 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
             "the path bends; take more load.steps_per_half_cycle"
         )
     return tuple(found)
+
+
+def _wide(scene: Scene) -> tuple[str, ...]:
+    """Doubt about free sides that are far apart, between which a joint is nearly in plane strain.
+
+    A strip of bricks as wide as its contact is long lost 5 % less than in plane stress at .3 of
+    gross slip, and as much from .6 on (calibration/finite_elements/sides.py).  Both planes bound
+    the energy: that of a bar goes as 1/E', where they differ by a factor 1 - nu^2.
+    """
+    strip = scene.strip
+    if strip.width is None or strip.plane == "strain" or strip.width <= strip.length:
+        return ()
+    nu = 0.3 if strip.poisson_ratio is None else float(strip.poisson_ratio)
+    return (
+        f"the joint is wider (strip.width = {float(strip.width):.4g}) than its contact is long "
+        f"({float(strip.length):.4g}), so that its middle is nearer to plane strain, where a force "
+        f"dissipates about {100.0 * nu**2:.2g} % less: compare with strip.plane = strain",
+    )
 
 
 def _exact(scene: Scene, instead: str) -> str:
@@ -147,7 +165,8 @@ def _buckling(scene: Scene) -> tuple[str, ...]:
     part = "part without pressure" if scene.member.support == "none" else "column"
     return (
         f"the {part} from X = {column.begin:.4g} to {column.end:.4g} may buckle: "
-        f"its Euler load is {column.limit:.3g} and the compression reaches {column.force:.3g}, "
+        f"its Euler load is {scene.wide * column.limit:.3g} and the compression reaches "
+        f"{scene.wide * column.force:.3g}, "
         f"which linear kinematics do not see; {_exact(scene, LESS)}, or press more of the strip",
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import jax
@@ -18,7 +19,12 @@ from jbeamshell.plotting.folder import write_folder
 from jbeamshell.scene.toml import scene_to_toml
 
 
-def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> list[Path]:
+def write_run(
+    folder: Path,
+    history: History,
+    figures: Mapping[str, Any],
+    units: Mapping[str, str] = MappingProxyType({}),
+) -> list[Path]:
     """Write the files of a run, and return their paths.
 
     | file | content |
@@ -31,14 +37,17 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
     | ``loop.png`` | the loop, if there are loads after the pressure |
     | ``profiles.png`` | slip, rotation, traction and reaction, if there are loads and friction |
     | ``contact.png`` | reaction, gap and squeeze, if w or psi is a field |
-    | ``joint.png`` | the deformed members, if there is a second one |
+    | ``joint.png`` | the members of a lap joint, its loop, slip and pressure |
 
     Parameters
     ----------
     folder : folder to write into, made if it does not exist
     history : run to report
     figures : content of result.json, such as ``history.figures()``
+    units : names of the scene's units by words such as "length", for the pictures
     """
+    from jbeamshell.plotting import in_units
+
     history = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
     steps = turning_steps(history)
     texts = {
@@ -58,7 +67,9 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
     if {"w", "psi"} & set(scene.plan.fields):
         drawn["contact.png"] = history.plot_contact()
     if scene.member.support != "none":
-        drawn["joint.png"] = history.plot_deformed()
+        drawn["joint.png"] = history.plot_joint() if history.cycles else history.plot_deformed()
+    for axes in drawn.values():
+        in_units(axes, units)
     pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
     return write_folder(folder, texts, pictures)
 

@@ -56,7 +56,7 @@ class Assembly(Model):
     ::
 
         def beam(scene, numbers):
-            joint = Joint.of(scene, 1.2, width=25.0).in_series(numbers["spring"])
+            joint = Joint.of(scene, 1.2).times(25.0).in_series(numbers["spring"])
             ratio = numbers["damping_ratio"]
             return Structure(mass, stiffness, [Attachment(joint, 0, 1)], damping_ratio=ratio)
 
@@ -244,8 +244,8 @@ class _Plain(eqx.Module):
     def __call__(self, scene: Scene | None, numbers: Mapping[str, Array]) -> Structure:
         assert scene is not None
         forced = scene.load.kind == "force"
-        force = self.reach * scene.gross_slip if forced else scene.load.amplitude
-        joint = Joint.of(scene, force, width=numbers["width"])
+        force = self.reach * scene.gross_slip if forced else scene.get("load.amplitude")
+        joint = Joint.of(scene, force).times(numbers["width"])
         if "series_stiffness" in numbers:
             joint = joint.in_series(numbers["series_stiffness"])
         return Structure(

@@ -205,7 +205,7 @@ def _with_strip(
 ) -> Comparison:
     """Comparison on a strip, with the strip itself in the first row."""
     require("load.control", scene.load.control, scene.load.control == "force", "must be 'force'")
-    given = LEVELS * float(scene.load.amplitude) if amplitudes is None else amplitudes
+    given = LEVELS * float(scene.get("load.amplitude")) if amplitudes is None else amplitudes
     amplitude = np.atleast_1d(np.asarray(given, dtype=float))
     cycles = [
         run(scene.replace({"load.amplitude": size, "load.cycles": max(scene.load.cycles, 1)}))

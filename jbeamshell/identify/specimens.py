@@ -30,6 +30,7 @@ from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
+from jbeamshell.scene.scene import Scene
 
 CYCLES = ("auto", "steady", "recorded")
 WRONG_DRIVE = (
@@ -218,6 +219,7 @@ class Specimen:
                         f"{item.label}: its columns name no units, but the specimen's dimensions "
                         "do: give --unit force=N --unit displacement=mm, or what they are"
                     )
+                self._check_width(item, width)
                 item = item.per_width(width)
             if isinstance(item, Loop) and item.as_recorded:
                 found += self._of_recording(item, asked, keeps_zero, unchecked)
@@ -226,6 +228,19 @@ class Specimen:
             else:
                 found.append((item, ()))
         return found
+
+    def _check_width(self, item: Loop, width: float) -> None:
+        """Refuse forces per width beside a scene with a width, whose forces are totals."""
+        given = self.scene
+        whole = given.get("strip.width") if isinstance(given, Scene | Mapping) else None
+        if whole is None and "strip.width" not in self.set:
+            return
+        fix = "divides forces, and the scene has a strip.width, with which they are totals: leave "
+        fix += "one of them out"
+        require("width", width, width == 1.0, fix)
+        per_width = [name for name, unit in (item.units or {}).items() if unit == "N/m"]
+        fix = "is per width, and the scene has a strip.width: leave strip.width out"
+        require(item.label, ", ".join(per_width), not per_width, fix)
 
     @property
     def _reading(self) -> dict[str, Any]:
@@ -322,7 +337,7 @@ def plausible_stiffness(model: Model, free: Sequence[str]) -> tuple[float, float
     unknown = any(key.startswith(("strip.", PREFIX)) and key not in OF_SHEAR for key in free)
     if strip.axial_stiffness is None or unknown:
         return None
-    stretching, length = float(strip.axial_stiffness), float(strip.length)
+    stretching, length = float(model.scene.get("strip.axial_stiffness")), float(strip.length)
     held = "v" in FAR_ENDS[strip.far_end]
     return stretching / (3.0 * length) * held, 10.0 * stretching / (
         length * float(strip.height_ratio)

@@ -257,7 +257,7 @@ def doubt_of_strain(known: Mapping[str, Any], scene: Scene, found: Estimate | No
     scene : strip at the start
     found : figures of the loops; None without loops
     """
-    stretching = scene.strip.axial_stiffness
+    stretching = scene.get("strip.axial_stiffness")
     given = any(key in known for key in STIFFNESS) or "strip.length" not in known
     if found is None or given or stretching is None:
         return []
@@ -283,7 +283,7 @@ def check_starts(cases: Sequence[Case], free: Sequence[str]) -> None:
         scene, found = case.model.own, _peak(case.measurements)
         if not isinstance(scene, Scene):
             continue
-        rule = gross_slip_rule(scene.load, scene.member, scene.number, found)
+        rule = gross_slip_rule(scene.load, scene.member, scene.number, found / scene.wide)
         if np.all(rule.holds):
             continue
         gross = float(scene.gross_slip)
@@ -346,7 +346,7 @@ def _gross_slip(found: Estimate, scene: Scene, values: Mapping[str, Any], forced
     stiff = "strip.axial_stiffness" in values or ("strip.youngs_modulus" in values and tall)
     if x is not None and stiff and scene.strip.axial_stiffness is not None:
         bar = force**2 * float(scene.strip.length) / (2.0 * found.displacement)
-        guess = _beyond_bar(x) * bar / float(scene.strip.axial_stiffness)
+        guess = _beyond_bar(x) * bar / float(scene.get("strip.axial_stiffness"))
     elif x is not None and tall:
         guess = 2.0 * force / (x * float(scene.strip.height_ratio))
     return float(np.clip(guess, least, force / LEAST))

@@ -37,7 +37,9 @@ def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath) -> None:
     if converged.all():
         return
     first = int(np.argmin(converged))
-    where = f"load step {first} of {converged.size - 1} (load {float(path.target[first]):.6g})"
+    wide = float(scene.wide)
+    load = float(path.target[first]) * (wide if scene.load.control == "force" else 1.0)
+    where = f"load step {first} of {converged.size - 1} (load {load:.6g})"
     if not path.rough[first]:
         where = f"pressing down (to {100.0 * float(path.pressure[first]):.3g} % of the pressure)"
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
@@ -46,7 +48,8 @@ def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath) -> None:
     if column.force >= NEAR_BUCKLING * column.limit:
         advice = (
             f"the part without pressure from X = {column.begin:.4g} to {column.end:.4g} buckles "
-            f"at {column.limit:.3g}: take a smaller load.amplitude, or press more of the strip"
+            f"at {wide * column.limit:.3g}: take a smaller load.amplitude, or press more of the "
+            "strip"
         )
     raise UnconvergedError(
         f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {advice}"

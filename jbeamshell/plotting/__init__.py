@@ -20,6 +20,7 @@ from jbeamshell.plotting.fits import overlay as overlay
 from jbeamshell.plotting.fits import residuals as residuals
 from jbeamshell.plotting.inspections import inspection as inspection
 from jbeamshell.plotting.joints import deformed as deformed
+from jbeamshell.plotting.joints import lap_joint as lap_joint
 from jbeamshell.plotting.motions import energies as energies
 from jbeamshell.plotting.motions import modal_curve as modal_curve
 from jbeamshell.plotting.motions import ring_down as ring_down

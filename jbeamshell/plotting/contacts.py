@@ -31,6 +31,7 @@ from jbeamshell.plotting.style import (
     panels,
     single,
     style,
+    unit_words,
 )
 
 # Titles and labels of the profiles that `contact` can draw, by their names in a history.
@@ -105,6 +106,7 @@ def contact(
         grid = _many(len(names)) if new else given_axes(axes, len(names), ", ".join(names))
         for name, panel in zip(names, grid.ravel(), strict=True):
             title, label = PROFILES[name]
+            label = unit_words(history, label)
             if name == "gap" and not founded:
                 title, label = "rise of the bottom face", "$w$  [length]"
             panel.set(title=title, xlabel=POSITION, ylabel=label)
@@ -211,7 +213,7 @@ def contact_map(
         else:
             turns = sorted(set(turning_points(driver[~failed])))
             axes.set_xticks(turns, [f"${driver[turn]:.3g}$" for turn in turns])
-            axes.set_xlabel(f"{FORCE}, along the path")
+            axes.set_xlabel(f"{unit_words(history, FORCE)}, along the path")
         below(axes, keys)
     return axes
 

@@ -8,11 +8,29 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from jbeamshell.plotting.shapes import KINDS, Shape, pressure_arrows, reach_of, shape_of
-from jbeamshell.plotting.steps import checked_steps, load_label
-from jbeamshell.plotting.style import DATA, FAINT, POSITION, SLIPS, STICKS, below, single, style
+from jbeamshell.plotting.steps import checked_steps, default_contact_steps, load_label
+from jbeamshell.plotting.style import (
+    DATA,
+    FAINT,
+    FORCE,
+    MOMENT,
+    PALETTE,
+    POSITION,
+    SLIPS,
+    STICKS,
+    below,
+    given_axes,
+    looks,
+    panels,
+    single,
+    style,
+    unit_words,
+)
 
+HEAD, SHANK = 0.45, 0.5  # height of a bolt's head over a plate, width of its shank over its patch
 LOOKS: tuple[tuple[str, Any], ...] = ((STICKS, "-"), (SLIPS, "-"), ("0.55", ":"))  # of KINDS
 FILL = ("#E8EEF4", "#F4EFE6")  # upper and lower member
 
@@ -26,6 +44,8 @@ def deformed(
     sections: int = 0,
 ) -> Axes:
     """Draw the deformed members with their pressures, and where the contact sticks, slips or lifts.
+
+    Bolts of a lap joint are drawn as bolts, heads as wide as their patches.
 
     Displacements along X are counted from the pressed members, as u(L) is.
     Overhangs of a lap joint are beams without shear from the contact's ends to theirs.
@@ -55,20 +75,24 @@ def deformed(
     """
     last = history.cycles[-1][2] if history.cycles else history.force.size - 1
     (step,) = checked_steps(history, [last if step is None else step])
-    drawn, end = shape_of(history, step, scale), float(history.x[-1])
+    drawn = shape_of(history, step, scale)
     with style():
         axes = single(axes)
         axes.grid(False)
         for outline, fill in zip(drawn.outlines, FILL, strict=False):
             axes.fill(*outline.T, facecolor=fill, edgecolor=DATA, linewidth=0.8)
         _draw_supports(axes, history, drawn.heights[-1])
-        _draw_pressures(axes, history, drawn)
+        if history.scene.member.support != "none" and history.scene.contact.bolts is not None:
+            _draw_bolts(axes, history, drawn)
+        else:
+            _draw_pressures(axes, history, drawn)
         _draw_sections(axes, history, step, drawn, sections)
         _draw_contact(axes, history, drawn)
         force = float(history.force[step])
         if abs(force) > 0.0:
-            start = (drawn.tip[0] + 0.01 * end, drawn.tip[1] - 0.5 * drawn.heights[0])
-            stop = (start[0] + 0.08 * end, start[1])
+            size = drawn.tip[0] - min(outline[:, 0].min() for outline in drawn.outlines)
+            start = (drawn.tip[0] + 0.02 * size, drawn.tip[1] - 0.5 * drawn.heights[0])
+            stop = (start[0] + 0.09 * size, start[1])
             ends = (stop, start) if force > 0.0 else (start, stop)
             axes.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": DATA})
         axes.set(xlabel=POSITION, ylabel="height  [length]", xlim=reach_of(history, 0.04, 0.12))
@@ -80,6 +104,68 @@ def deformed(
         ]
         below(axes, keys)
     return axes
+
+
+def lap_joint(history: Any, step: int | None = None, axes: Any = None) -> np.ndarray:
+    """Draw a lap joint with its bolts, its loop, and slip and pressure over its length.
+
+    The loop is that of the last cycle, less the displacement F/K of its secant stiffness, so that
+    its width is seen.
+    Slip and pressure are those of the pressed joint and of both turns of the last cycle.  Slip is
+    drawn where the members touch; thin lines are the relative displacement where they are open.
+
+    Parameters
+    ----------
+    history : jbeamshell.History
+        Solved load path of a lap joint.
+    step : int, optional
+        Step at which the members are drawn; the end of the last cycle when not given.
+    axes : array_like of matplotlib.axes.Axes, optional
+        Four axes; a new figure when not given.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+        The axes drawn into, in the shape they came in, or (2, 2).
+
+    Raises
+    ------
+    InputError
+        If there is no such step, or there are not four axes.
+    """
+    chosen, x = default_contact_steps(history), np.asarray(history.x)
+    with style():
+        grid = panels(2, 2) if axes is None else given_axes(axes, 4, "a lap joint")
+        members, hysteresis, slip, pressure = grid.ravel()
+        deformed(history, step, members)
+        _draw_thin_loop(hysteresis, history)
+        for step, look in zip(chosen, looks(len(chosen)), strict=True):
+            touching = np.asarray(history.touching[step])
+            values = np.asarray(history.slip[step])
+            pressed = step <= history.pressed
+            label = "pressed" if pressed else load_label(history, step)
+            pressure.plot(x, np.asarray(history.reaction[step]), **look, label=label)
+            if not pressed:
+                slip.plot(x, values, color=look["color"], linewidth=0.6)
+                slip.plot(x, np.where(touching, values, np.nan), **look, label=label)
+        slip.set(title="slip", xlabel=POSITION, ylabel="$v - v_p$  [length]")
+        pressure.set(title="contact pressure", xlabel=POSITION, ylabel="$R$  [stress]")
+        usual = max(float(np.max(history.reaction[chosen[0]])), 1e-300)
+        pressure.set_ylim(-0.05 * usual, 1.6 * usual)  # peaks where corners touch go beyond
+        for panel in (slip, pressure):
+            panel.legend(loc="best")
+    return grid
+
+
+def _draw_thin_loop(axes: Axes, history: Any) -> None:
+    """Last loop without the displacement of its secant stiffness."""
+    force, displacement = map(np.asarray, history.loop)
+    moment = history.scene.load.kind == "moment"
+    left = displacement - force / float(history.secant_stiffness)
+    axes.plot(left - 0.5 * (left[0] + left[-1]), force, color=PALETTE[0], linewidth=1.8)
+    x, y = ("rotation - $M/K$  [rad]", MOMENT) if moment else ("$u(L) - F/K$  [length]", FORCE)
+    axes.set(title="loop, less its stiffness", xlabel=x, ylabel=unit_words(history, y))
+    axes.xaxis.set_major_locator(MaxNLocator(5))
 
 
 def _draw_supports(axes: Axes, history: Any, bottom: float) -> None:
@@ -99,6 +185,27 @@ def _draw_supports(axes: Axes, history: Any, bottom: float) -> None:
         end = float(history.x[-1])
         end += 0.0 if scene.strip.overhang is None else float(scene.strip.overhang)
         axes.plot([end, end], [0.0, top], color=DATA, linewidth=2.5, linestyle=(0, (1, 1)))
+
+
+def _draw_bolts(axes: Axes, history: Any, drawn: Shape) -> None:
+    """Bolts through the members: heads on the outer faces, and shanks."""
+    x, (top, bottom) = np.asarray(history.x), drawn.heights
+    upper, lower = drawn.outer
+    size = HEAD * top
+    alone = history.scene.member.support == "rolling"  # whose lower face is a symmetry plane
+    for place, _, width in np.asarray(history.scene.contact.bolts).tolist():
+        ends = [float(np.interp(place, x, face[:, 1])) for face in (upper, lower)]
+        half = 0.5 * SHANK * width
+        for side in (-half, half):
+            look: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 2}
+            axes.plot([place + side] * 2, ends, color=FAINT, **look)
+        for end, way in zip(ends, (1.0, -1.0), strict=True):
+            if way > 0.0 or not alone:
+                corners = [(-0.5, 0.0), (0.5, 0.0), (0.5, way), (-0.5, way)]
+                points = np.array([(place + a * width, end + b * size) for a, b in corners])
+                axes.fill(*points.T, facecolor="0.75", edgecolor=DATA, linewidth=0.8)
+    axes.update_datalim([(0.0, top + 1.6 * size), (0.0, bottom - (not alone) * 1.6 * size)])
+    axes.autoscale_view()
 
 
 def _draw_pressures(axes: Axes, history: Any, drawn: Shape) -> None:

@@ -26,6 +26,7 @@ from jbeamshell.plotting.style import (
     panels,
     single,
     style,
+    unit_words,
 )
 
 SLIPPED: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 3.2}
@@ -62,7 +63,7 @@ def loop(history: Any, axes: Axes | None = None, *, moment: bool = False) -> Axe
             force, displacement = map(np.asarray, history.loop)
             axes.plot(displacement, force, color=PALETTE[0], linewidth=2.0, label="last cycle")
         labels = (ROTATION, MOMENT) if moment else (DISPLACEMENT, FORCE)
-        axes.set(xlabel=labels[0], ylabel=labels[1])
+        axes.set(xlabel=labels[0], ylabel=unit_words(history, labels[1]))
         axes.xaxis.set_major_locator(MaxNLocator(5))  # their numbers may be long
         axes.legend(loc="upper left")
     return axes

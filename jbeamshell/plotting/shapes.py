@@ -146,7 +146,8 @@ def _overhangs(
     if scene.strip.overhang is not None:
         fields, up = members[0]
         size = float(scene.strip.overhang)
-        strain = float(history.force[step]) / float(scene.strip.stretching_stiffness)
+        stiffness = float(scene.wide) * float(scene.strip.stretching_stiffness)
+        strain = float(history.force[step]) / stiffness
         s = np.linspace(0.0, 1.0, BEAM)
         _, w, beta, _ = (float(value) for value in fields[step, -1, :4])
         bend = 0.0 if scene.member.loaded_end == "free" else -(w + beta * size)

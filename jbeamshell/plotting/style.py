@@ -156,6 +156,13 @@ def in_units(axes: Any, units: Mapping[str, str]) -> None:
             axis.set_label_text(text)
 
 
+def unit_words(history: Any, label: str) -> str:
+    """Label of a force, without the words for one unit of width where a scene has its own."""
+    scene = getattr(history, "scene", None)
+    whole = scene is not None and scene.strip.width is not None
+    return label.replace("/width", "") if whole else label
+
+
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure to a file, whole or not at all.
 

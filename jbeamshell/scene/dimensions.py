@@ -1,11 +1,7 @@
-"""Dimensions of a real specimen, with units, as values of a scene in SI.
+"""Dimensions of a real specimen or lap joint, with units, as values of a scene in SI.
 
-Forces of a scene are per unit width, so N/m.  X runs from the supported end to the loaded one.
-
-The pressure of a bolt is even over the patch where its pressure cone meets the contact. The cone
-widens from the head, or the washer, of width d at 30 degrees to its axis, as is usual for clamped
-plates (Shigley, Mechanical Engineering Design, 10th ed., section 8-5; VDI 2230 part 1).  It goes
-through the whole thickness 2H, so the patch is d + 2 (2H) tan 30 = d + 4 H tan 30 wide.
+X runs from the supported end to the loaded one.  A bolt presses evenly on a patch under its head,
+see `jbeamshell.scene.bolts`.
 """
 
 from __future__ import annotations
@@ -20,31 +16,27 @@ import numpy as np
 
 from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.columns import factor_of
-from jbeamshell.scene.dimension_table import DIMENSIONS
+from jbeamshell.scene.bolts import FRICTION, PART_OF_HEAD, SIZES, TIGHTENING, Bolt, patch_width
+from jbeamshell.scene.dimension_table import ALL
+from jbeamshell.scene.quantities import quantity
 
-HALF_ANGLE = math.radians(30.0)
-HEAD = 1.5  # bearing diameter of a bolt's head over its nominal one (Shigley, table A-29)
-# Stress areas of coarse metric threads [m^2] by nominal diameter [m] (Shigley, table 8-1).
-STRESS_AREA = {
-    1e-3 * diameter: 1e-6 * area
-    for diameter, area in (
-        *((3, 5.03), (4, 8.78), (5, 14.2), (6, 20.1), (8, 36.6), (10, 58.0), (12, 84.3)),
-        *((14, 115.0), (16, 157.0), (20, 245.0), (24, 353.0), (30, 561.0), (36, 817.0)),
-    )
-}
-PRELOAD = 0.75 * 600e6  # usual preload over stress area [Pa], property class 8.8 (section 8-9)
+PROOF = 0.75  # usual part of the proof load, by which the head of a preload is guessed
 ROUNDING = 1e-9  # part of the length within which two ends of patches are one
 
 KEYS = {
     "length": "strip.length",
+    "width": "strip.width",
     "modulus": "strip.youngs_modulus",
     "poisson": "strip.poisson_ratio",
     "pressure": "contact.pressure",
+    "friction": "contact.friction",
+    "force": "load.amplitude",
 }
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-QUANTITY = re.compile(rf"\s*({NUMBER})\s*([^\d\s.+-].*?)?\s*")
+JOINTS = {"single-lap": "clamped", "double-lap": "rolling"}
+OF_JOINT = ("overhang", "other_thickness")
+OF_BOLTS = ("torque", "proof", "grade", "thread_friction", "head")
 KIND = re.compile(r"\s*(?:(\d+)\s*[x*]\s*)?([^@]+)@(.+)")
+SIZED = re.compile(r"(M\s*\d+(?:\s*x\s*\d*\.?\d+)?)(?:[\s-]+(\S+))?")
 
 
 class Dimensions(NamedTuple):
@@ -52,14 +44,35 @@ class Dimensions(NamedTuple):
 
     Attributes
     ----------
-    values : values of a scene by dotted key; forces are per unit width
-    width : width [m], None if it is not known
+    totals : values of a scene by dotted key; forces are those of the whole width, if it is known
     notes : sentences on what was taken for granted
+    bolts : bolts in words, a sentence for each kind
+    scatter : half the range of the bolts' preloads over their mean
     """
 
-    values: dict[str, Any]
-    width: float | None
-    notes: tuple[str, ...]
+    totals: dict[str, Any]
+    notes: tuple[str, ...] = ()
+    bolts: tuple[str, ...] = ()
+    scatter: float = 0.0
+
+    @property
+    def width(self) -> float | None:
+        """Width [m], None if it is not known."""
+        return self.totals.get("strip.width")
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Values of a scene by dotted key for one unit of width, one half of a double lap."""
+        found, width = dict(self.totals), self.width
+        if width is None:
+            return found
+        del found["strip.width"]
+        if "contact.bolts" in found:
+            found["contact.bolts"] = [[x, f / width, w] for x, f, w in found["contact.bolts"]]
+        if "load.amplitude" in found:
+            halves = 2.0 if found.get("member.support") == "rolling" else 1.0
+            found["load.amplitude"] /= width * halves
+        return found
 
 
 def dimensions_of(texts: Mapping[str, Any]) -> Dimensions:
@@ -67,14 +80,13 @@ def dimensions_of(texts: Mapping[str, Any]) -> Dimensions:
 
     Parameters
     ----------
-    texts : texts by name, one of `DIMENSIONS`: length, thickness, width, modulus, poisson (a
-        number), pressure or bolts, head
+    texts : texts by name, those of `jbeamshell.scene.dimension_table`
 
     Raises
     ------
     InputError
-        for an unknown name or unit, a number without unit, a bolt off the strip, and bolts whose
-        pressure is not determined, naming the fix
+        for an unknown name or unit, a number without unit, a bolt off the strip or loaded beyond
+        its proof load, and bolts whose pressure is not determined, naming the fix
 
     Examples
     --------
@@ -83,51 +95,53 @@ def dimensions_of(texts: Mapping[str, Any]) -> Dimensions:
     (0.006, 210000000000.0)
     """
     for name in texts:
-        if name not in DIMENSIONS:
-            raise InputError(f"{name!r}: is no dimension; known are {', '.join(DIMENSIONS)}")
-    sizes = {name: _size(name, text) for name, text in texts.items() if name != "bolts"}
-    values: dict[str, Any] = {KEYS[name]: sizes[name] for name in KEYS if name in sizes}
+        if name not in ALL:
+            raise InputError(f"{name!r}: is no dimension; known are {', '.join(ALL)}")
+    sizes = {name: _size(name, text) for name, text in texts.items() if ALL[name].unit != "word"}
+    totals: dict[str, Any] = {KEYS[name]: sizes[name] for name in KEYS if name in sizes}
     if "thickness" in sizes:
-        values["strip.half_height"] = 0.5 * sizes["thickness"]
-    notes: tuple[str, ...] = ()
+        totals["strip.half_height"] = 0.5 * sizes["thickness"]
+    if "force" in texts:
+        fix = "is that of a whole width: give width, such as width = 50mm"
+        require("force", texts["force"], "width" in sizes, fix)
+    totals |= _lap(texts, sizes)
     if "bolts" in texts:
-        values["contact.bolts"], notes = _bolted(texts["bolts"], sizes)
-    elif "head" in texts:
-        raise InputError(f"head = {texts['head']!r}: belongs to bolts: give bolts, or leave it out")
-    return Dimensions(values, sizes.get("width"), notes)
+        return _bolted(texts, sizes, totals)
+    for name in OF_BOLTS:
+        fix = "belongs to bolts: give bolts, or leave it out"
+        require(name, texts.get(name), name not in texts, fix)
+    return Dimensions(totals, scatter=_scatter(sizes, 1.0))
 
 
-def quantity(name: str, text: Any, unit: str, example: str) -> float:
-    """Positive number in a base unit from a text such as "120 mm".
-
-    Parameters
-    ----------
-    name : name for messages
-    text : number and unit
-    unit : base unit, "m", "N" or "Pa"
-    example : text that would do
-
-    Raises
-    ------
-    InputError
-        if it is no positive number, or if its unit is missing or of another kind
-    """
-    match = QUANTITY.fullmatch(text) if isinstance(text, str) else None
-    if match is None or match[2] is None:
-        number = match is not None or (isinstance(text, int | float) and not isinstance(text, bool))
-        fix = "names no unit" if number else "is no number with a unit"
-        raise InputError(f"{name} = {shown(text)}: {fix}: write one, such as {example}")
-    factor = factor_of(match[2], (unit,))
-    if factor is None:
-        fix = f"{match[2][:20]!r} is no unit that {unit} measures: write {example}"
-        raise InputError(f"{name} = {text!r}: {fix}")
-    value = float(match[1]) * factor
-    require(name, text, 0.0 < value < math.inf, "must be positive")
-    return value
+def _lap(texts: Mapping[str, Any], sizes: Mapping[str, float]) -> dict[str, Any]:
+    """Values of a lap joint; none of a strip on a base."""
+    joint = texts.get("joint")
+    if joint is None:
+        for name in OF_JOINT:
+            fix = "belongs to a joint: give joint = single-lap or double-lap"
+            require(name, texts.get(name), name not in texts, fix)
+        return {}
+    require("joint", joint, joint in JOINTS, f"choose {' or '.join(JOINTS)}")
+    support = JOINTS[joint]
+    found: dict[str, Any] = {"member.support": support, "strip.far_end": "free"}
+    found["member.assembly"] = "frictional"  # as bolts are tightened
+    if support == "clamped":
+        found["member.loaded_end"] = "level"
+        if "pressure" in sizes:
+            found["contact.bottom_pressure"] = sizes["pressure"]
+    if "overhang" in sizes:
+        found |= dict.fromkeys(("strip.overhang", "member.overhang"), sizes["overhang"])
+    usual = {"clamped": 1.0, "rolling": 2.0}[support] * sizes.get("thickness", math.nan)
+    other = sizes.get("other_thickness", usual)
+    if "length" in sizes and math.isfinite(other):
+        # The symmetry plane of a double lap halves its inner plate.
+        half = other if support == "clamped" else 0.5 * other
+        found["member.height_ratio"] = half / sizes["length"]
+    return found
 
 
 def _size(name: str, text: Any) -> float:
-    unit, example, _ = DIMENSIONS[name]
+    unit, example, _ = ALL[name]
     if unit:
         return quantity(name, text, unit, example)
     try:
@@ -136,52 +150,103 @@ def _size(name: str, text: Any) -> float:
         raise InputError(f"{name} = {shown(text)}: give a number, such as {example}") from None
 
 
-def _bolted(text: Any, sizes: Mapping[str, float]) -> tuple[list[list[float]], tuple[str, ...]]:
-    """Bolts as rows [X, force per width, width of the patch], and notes."""
+def _bolted(
+    texts: Mapping[str, Any], sizes: Mapping[str, float], totals: dict[str, Any]
+) -> Dimensions:
+    """Dimensions with bolts as rows [X, force, width of the patch]."""
+    text = texts["bolts"]
     require("bolts", text, "pressure" not in sizes, "give either bolts or a pressure")
-    for name in ("length", "thickness", "width"):
-        fix = f"their pressure needs {name}: give it, such as {name} = {DIMENSIONS[name].example}"
+    for name in ("length", "width"):
+        fix = f"their pressure needs {name}: give it, such as {name} = {ALL[name].example}"
         require("bolts", text, name in sizes, fix)
-    length, notes, patches = sizes["length"], [], []
+    length, notes, words, patches = sizes["length"], [], [], []
+    scatter = 0.0
     kinds = text if isinstance(text, list | tuple) else str(text).split(";")
     for kind in kinds:
-        force, places = _bolts(kind)
-        head = sizes.get("head") or _usual_head(kind, force)
-        if "head" not in sizes:
-            notes.append(
-                f"bolts {kind}: a head of {1e3 * head:.3g} mm is taken, that of the smallest 8.8 "
-                "bolt for this preload: give head to change it"
-            )
-        reach = 0.5 * head + sizes["thickness"] * math.tan(HALF_ANGLE)
+        what, places = _placed(kind)
+        sized = SIZED.fullmatch(what)
+        if sized is not None:
+            bolt = _of_size(sized, texts, sizes)
+            force, patch = bolt.preload, 1e-3 * bolt.patch
+            scatter = max(scatter, bolt.scatter)
+            words.append(str(bolt))
+            _check_hole(kind, bolt, sizes["width"])
+        else:
+            force = quantity("bolts: preload", what, "N", "8kN")
+            for name in ("torque", "proof", "grade"):
+                fix = (
+                    f"{kind.strip()} has a preload already: leave it out, or give a size such as M8"
+                )
+                require(name, texts.get(name), name not in texts, fix)
+            head = sizes.get("head") or _usual_head(kind, force)
+            patch = patch_width(head, PART_OF_HEAD * head)
+            scatter = max(scatter, _scatter(sizes, 1.0))
+            if "head" not in sizes:
+                notes.append(
+                    f"bolts {kind}: a head of {1e3 * head:.3g} mm is taken, that of the smallest "
+                    "8.8 bolt for this preload: give head to change it"
+                )
         for place in places:
             fix = f"X = {1e3 * place:.6g} mm lies off the strip of {1e3 * length:.6g} mm"
             require("bolts", kind, place <= length, fix)
-            low, high = max(place - reach, 0.0), min(place + reach, length)
-            patches.append((low, high, force / sizes["width"] / (high - low)))
-    return _apart(patches, length), tuple(notes)
+            low, high = max(place - 0.5 * patch, 0.0), min(place + 0.5 * patch, length)
+            patches.append((low, high, force / (high - low)))
+    totals = totals | {"contact.bolts": _apart(patches, length)}
+    return Dimensions(totals, tuple(notes), tuple(words), scatter)
 
 
-def _bolts(text: Any) -> tuple[float, list[float]]:
-    """Preload [N] and positions [m] of some bolts alike."""
-    example = DIMENSIONS["bolts"].example
+def _of_size(sized: re.Match[str], texts: Mapping[str, Any], sizes: Mapping[str, float]) -> Bolt:
+    """Bolt of a size, tightened as the dimensions say."""
+    if not {"torque", "proof"} & set(texts):
+        fix = "says no preload: give torque, such as torque = 25Nm, or proof, such as proof = 0.75"
+        raise InputError(f"bolts = {sized[0]!r}: {fix}")
+    head = 1e3 * sizes["head"] if "head" in sizes else None
+    return Bolt(
+        sized[1],
+        sized[2] or str(texts.get("grade", "8.8")),
+        texts.get("torque"),
+        sizes.get("proof"),
+        friction=sizes.get("thread_friction", FRICTION),
+        tightening=sizes.get("tightening", TIGHTENING),
+        head=head,
+    )
+
+
+def _check_hole(kind: str, bolt: Bolt, width: float) -> None:
+    """Refuse a hole that is as wide as the plate."""
+    fix = f"its hole of {bolt.holed:g} mm leaves nothing of a plate {1e3 * width:g} mm wide: "
+    require("bolts", kind, bolt.holed < 999.999 * width, f"{fix}take a smaller bolt, or give width")
+
+
+def _scatter(sizes: Mapping[str, float], usual: float) -> float:
+    """Half the range of preloads over their mean, by the tightening factor."""
+    factor = sizes.get("tightening", usual)
+    fix = "is the largest preload over the smallest: give 1, or more, such as 1.6"
+    require("tightening", factor, 1.0 <= factor < math.inf, fix)
+    return (factor - 1.0) / (factor + 1.0)
+
+
+def _placed(text: Any) -> tuple[str, list[float]]:
+    """Size or preload of some bolts alike, and their positions [m]."""
+    example = ALL["bolts"].example
     match = KIND.fullmatch(text) if isinstance(text, str) else None
     if match is None:
         raise InputError(f"bolts = {shown(text)}: write number, preload and positions: {example}")
-    force = quantity("bolts: preload", match[2].strip(), "N", "8kN")
     places = [
         quantity("bolts: position", place.strip(), "m", "30mm") for place in match[3].split(",")
     ]
     count = len(places) if match[1] is None else int(match[1])
     fix = f"{count} bolts have {len(places)} positions: give one position for each"
     require("bolts", text, count == len(places), fix)
-    return force, places
+    return match[2].strip(), places
 
 
 def _usual_head(kind: str, force: float) -> float:
     """Bearing diameter [m] of the smallest bolt of property class 8.8 that carries a preload."""
-    fits = [diameter for diameter, area in STRESS_AREA.items() if PRELOAD * area >= force]
+    bolts = (Bolt(f"M{size}", proof=PROOF) for size in SIZES)
+    fits = [bolt.bearing for bolt in bolts if bolt.preload >= force]
     require("bolts", kind, bool(fits), "no bolt up to M36 carries that usually: give head too")
-    return HEAD * fits[0]
+    return 1e-3 * fits[0]
 
 
 def _apart(patches: list[tuple[float, float, float]], length: float) -> list[list[float]]:

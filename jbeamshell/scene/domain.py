@@ -90,7 +90,9 @@ def support_rules(
 
 
 def gross_slip(numbers: Callable[[str], Any], support: str) -> Any:
-    """End force per width at which all of the contact slides, mu F_N L; any shape, may be traced.
+    """End force per unit of width at which all of the contact slides, mu F_N L.
+
+    It has any shape, and may be traced.
 
     Parameters
     ----------
@@ -112,7 +114,7 @@ def gross_slip_rule(
     ----------
     load, member : for their words
     numbers : values by dotted key
-    targets : controlled loads, any shape
+    targets : controlled loads of one unit of width, any shape
     part : part of the pressures that acts with each
     """
     key, size = "load.amplitude", np.abs(np.asarray(targets))
@@ -123,11 +125,13 @@ def gross_slip_rule(
     limit = gross_slip(numbers, member.support)
     below = stays_below(size, limit, np.asarray(part))
     worst = np.max(np.broadcast_to(size, np.shape(below)), where=~below, initial=0.0)
+    width = numbers("strip.width")
+    wide = np.where(np.isnan(width), 1.0, width * (2.0 if member.support == "rolling" else 1.0))
     return Rule(
         key,
-        float(worst),
+        float(np.max(wide * worst)),
         below,
-        f"must stay below gross slip, mu F_N L = {np.max(limit):.6g}; "
+        f"must stay below gross slip, mu F_N L = {np.max(wide * limit):.6g}; "
         "set load.control to 'displacement' or 'arc-length' to go beyond",
     )
 

@@ -19,6 +19,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.mechanics.homogeneous import plane_modulus, youngs_modulus
 from jbeamshell.scene.keys import TABLE, TWINS, leaf_of
+from jbeamshell.scene.rows import AUTO
 
 # Fields that hold what is given, by both keys that can say it.
 HOLDERS = {
@@ -89,10 +90,12 @@ class Forms(Tree):
     Attributes
     ----------
     given_height, given_stiffness : what is given; layers leave no stiffness
+    given_plane : "strain", "stress", or "auto" if it follows from the width
     """
 
     given_height: Given = eqx.field(default=None)
     given_stiffness: Given | None = eqx.field(default=None)
+    given_plane: str = eqx.field(static=True, default=AUTO)
 
     @property
     def said(self) -> set[str]:
@@ -109,6 +112,14 @@ class Forms(Tree):
         others : keys whose numbers are given in place of the strip's
         """
         return key in HOLDERS and (TWINS[key] in others or TWINS[key] in self.said)
+
+    @property
+    def plane(self) -> str:
+        """Plane "strain" or "stress"; free sides, as a joint with a width has, are in stress."""
+        if self.given_plane != AUTO:
+            return self.given_plane
+        width = getattr(self, "width", None)
+        return "strain" if width is None else "stress"
 
     @property
     def height_ratio(self) -> Array:
@@ -132,7 +143,10 @@ class Forms(Tree):
 
     @np.errstate(all="ignore")  # the strip refuses what is not finite
     def in_one_form(self) -> Self:
-        """Same strip by its height ratio and E' 2H, so that programs do not ask what was given."""
+        """Same strip by its height ratio and E' 2H, so that programs do not ask what was given.
+
+        Its forces are those of one unit of width, which no program asks for either.
+        """
         numbers: Any = jnp if is_traced(self) else np  # much faster
         strip = jax.tree.map(numbers.asarray, self)
         forms = {
@@ -140,7 +154,7 @@ class Forms(Tree):
             for key in ("strip.height_ratio", "strip.axial_stiffness")
             if getattr(strip, HOLDERS[key]) is not None
         }
-        return cast(Self, strip.but(**forms))
+        return cast(Self, strip.but(**forms, width=None, given_plane=self.plane))
 
     def _value(self, key: str) -> Any:
         """Value of a key of the strip, as it was given or as it follows."""

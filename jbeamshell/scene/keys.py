@@ -50,6 +50,13 @@ class StripKeys(Part):
     heading: ClassVar[str] = "strip"
 
     length: Array = number(2.0, "Length L of the strip.", symbol="L", unit="length")
+    width: Array | None = number(
+        None,
+        "Width of the joint, whose forces, works and stiffnesses are totals then and whose sides "
+        "are free; none is one unit of width.",
+        symbol="b",
+        unit="length",
+    )
     height_ratio: InitVar[Any] = number(
         0.1126,
         "Half height over half the length, eta = H/(L/2).",
@@ -107,7 +114,9 @@ class StripKeys(Part):
         table=True,
         fix=LAYERS,
     )
-    plane: str = word("strain", PLANES, "Plane strain or plane stress.")
+    plane: InitVar[Any] = word(
+        AUTO, PLANES, "Plane strain or plane stress; auto is stress where strip.width is given."
+    )
     curvature: Array | None = number(
         None,
         "Curvature alpha' before loading, positive if the ends point up; none is straight.",
@@ -311,14 +320,14 @@ class MemberKeys(Part):
         "Stiffness of the bolts' shanks against slip, which stays beyond gross slip; spread as the "
         "pressure; none is none.",
         symbol="k_b",
-        unit="stress",
+        unit="force/width/length",
     )
     bearing_stiffness: Array | None = number(
         None,
         "Stiffness of the bolts' shanks on their holes, once the bolts' mean slip exceeds the "
         "clearance; none is none.",
         symbol="k_c",
-        unit="stress",
+        unit="force/width/length",
     )
     clearance: Array | None = number(
         None,
@@ -335,8 +344,8 @@ INDIRECT = (
         "contact.bolts",
         "number",
         None,
-        "Bolts, rows [X, force per width, width of the patch]; sets the pressure on the top face, "
-        "and below a clamped second member.",
+        "Bolts, rows [X, force, width of the patch], the force per width unless strip.width is "
+        "given; sets the pressure on the top face, and below a clamped second member.",
         unit="mixed",
         table=True,
         through="contact.pressure",
@@ -365,6 +374,12 @@ DERIVED = {row.name: row.through for row in TABLE.values() if row.through}
 TWINS = DERIVED | {through: name for name, through in DERIVED.items()}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
+WIDTH_OF_ALL = "strip.width"
+# Numbers that are totals where a width is given; of bolts it is their forces.
+TOTALS = (
+    *(name for name, key in TABLE.items() if "/width" in key.unit),
+    "contact.bolts",
+)
 # Keys of old files, with what is to be done about them.
 _SECTION = "say model.section: bar, shell, squeeze or plane"
 _HOLE = "say contact.pressure, a table that is zero over the hole"
@@ -418,11 +433,18 @@ def leaf_of(key: str, value: Any) -> Array:
     return number
 
 
-def unit_of(key: str, load: LoadKeys) -> str:
-    """Unit of a number of the scene; that of the amplitude depends on what is controlled."""
-    if key != "load.amplitude":
-        return TABLE[key].unit
-    turns = load.kind == "moment"
-    if load.control in LENGTHS:
-        return "rad" if turns else "length"
-    return "force length/width" if turns else TABLE[key].unit
+def unit_of(key: str, load: LoadKeys, whole: bool = False) -> str:
+    """Unit of a number of the scene; that of the amplitude depends on what is controlled.
+
+    Parameters
+    ----------
+    key : dotted key
+    load : load of the scene
+    whole : True where forces are totals, those of the scene's width
+    """
+    unit, turns = TABLE[key].unit, load.kind == "moment"
+    if key == "load.amplitude" and load.control in LENGTHS:
+        unit = "rad" if turns else "length"
+    elif key == "load.amplitude" and turns:
+        unit = "force length/width"
+    return unit.replace("/width", "") if whole else unit

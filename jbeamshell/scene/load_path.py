@@ -27,7 +27,10 @@ LOADS = "give (steps,) loads, or (steps, 2) with pressures"
 def check(
     scene: Scene, path: ArrayLike | None = None
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
-    """Whole path and its closed cycles (start, turn, end); see `solve` for its `InputError`."""
+    """Whole path and its closed cycles (start, turn, end); see `solve` for its `InputError`.
+
+    Forces that are given are those of the scene's width, and those of the path of one unit of it.
+    """
     loads, cycles = whole_path(scene, path)
     if not is_traced(scene, loads):
         _check_size(scene, loads)
@@ -54,6 +57,8 @@ def whole_path(
         require("path", np.shape(path), shaped, LOADS)
         constant = np.ones(loads.shape, loads.dtype)
         targets, pressures = (loads, constant) if loads.ndim == 1 else loads.T
+        if scene.load.control == "force" and scene.strip.width is not None:
+            targets = targets / scene.wide
         cycles = ()
         if not is_traced(loads):
             finite = np.isfinite(loads)
@@ -125,7 +130,8 @@ class LoadPath(NamedTuple):
 
     Attributes
     ----------
-    target : controlled load: F, u(L) or, for the arc length, the way along the path, signed
+    target : controlled load: F of one unit of width, u(L) or, for the arc length, the way along
+        the path, signed
     pressure : part of the pressures that acts; traced only if the path changes it
     rough : 1 with friction, 0 while the strip is pressed down before it
     """

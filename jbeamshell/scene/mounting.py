@@ -34,12 +34,13 @@ def in_words(scene: Parts, varied: Collection[str] = ()) -> str:
     held, loaded = (_place(scene, key, key in varied) for key in OVERHANGS)
     height = "keeps its height" if end == "level" else "may deflect"
     turns = "does not turn" if scene.load.entry == "guided" else "may turn"
+    both = support == "rolling" and scene.strip.width is not None
     decides = any(key not in varied for key in left_open(scene))
     return (
         f"{KINDS[support]}: held {held}, loaded {loaded} (load.entry = {scene.load.entry}); "
         f"the loaded end {height} (member.loaded_end = {end}) and {turns}"
-        + "; overhangs change what it loses"
-        * decides
+        + "; forces and works are those of both halves" * both
+        + "; overhangs change what it loses" * decides
     )
 
 

@@ -45,11 +45,21 @@ class Strip(Forms, StripKeys):
     Of ``height_ratio`` and ``half_height`` one is given, the last one that was set, and the other
     one follows.  So it is with ``axial_stiffness`` and ``youngs_modulus``.  With ``layers`` there
     is no stiffness and no ``poisson_ratio``: they are None.
+
+    Forces and stiffnesses of the parts of a scene are those of one unit of width.  Where there is a
+    ``width``, `Scene.replace` takes totals and `Scene.get` gives them.
     """
 
     def __post_init__(
-        self, height_ratio: Any, half_height: Any, axial_stiffness: Any, youngs_modulus: Any
+        self,
+        height_ratio: Any,
+        half_height: Any,
+        axial_stiffness: Any,
+        youngs_modulus: Any,
+        plane: Any,
     ) -> None:
+        TABLE["strip.plane"].check(plane)
+        self.given_plane = self.given_plane if plane == AUTO else plane
         tall = {"strip.height_ratio": height_ratio, "strip.half_height": half_height}
         stiff = {"strip.axial_stiffness": axial_stiffness, "strip.youngs_modulus": youngs_modulus}
         self.given_height = given(tall, self.given_height) or default("strip.height_ratio")
@@ -86,6 +96,7 @@ class Strip(Forms, StripKeys):
     def changed(self, **values: Any) -> Self:
         own = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         own |= {HOLDERS[key]: None for key in HOLDERS if key.removeprefix("strip.") in values}
+        own |= {"given_plane": AUTO} if "plane" in values else {}
         if values.get("layers") is not None:  # which give the stiffness and nu
             own |= {"given_stiffness": None, "poisson_ratio": None}
         return type(self)(**own | values)

@@ -1,8 +1,8 @@
 """Scene: everything that defines a run, as a frozen pytree whose physical parameters are leaves.
 
 ``Scene()`` is the standard strip.  Units are the user's own, as long as they are consistent; forces
-are per unit width.  Dotted keys ("strip.height_ratio") name the same things in the TOML file, on
-the command line and among the free parameters of a fit.
+are per unit width, or totals where there is a `strip.width`.  Dotted keys ("strip.height_ratio")
+name the same things in the TOML file, on the command line and among the free parameters of a fit.
 """
 
 from __future__ import annotations
@@ -35,13 +35,23 @@ from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy
 from jbeamshell.scene.domain import Numbers, gross_slip, support_rules
 from jbeamshell.scene.forms import follows
 from jbeamshell.scene.joint import check_joint
-from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key, leaf_of
+from jbeamshell.scene.keys import (
+    CONTROLS,
+    DERIVED,
+    FAR_ENDS,
+    KAPPA_S,
+    TABLE,
+    WIDTH_OF_ALL,
+    check_key,
+    leaf_of,
+)
 from jbeamshell.scene.parts import PARTS, Contact, Load, Member, Model, Part, Strip
 from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.planning import finer, may_be_elastic, plan
 from jbeamshell.scene.pressure import bolt_pressure
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.text import summary
+from jbeamshell.scene.width import halves, is_total, per_width, pressure_factor, times
 
 MOST_LEVELS = 10**7  # load steps of a path
 ALMOST_RIGID = 1000.0  # stiffness of rigid sliders in load steps, in units of G/l
@@ -232,12 +242,22 @@ class Scene(Tree):
 
     @property
     def gross_slip(self) -> Any:
-        """End force per width at which all of the contact slides, mu F_N L; may be traced.
+        """End force at which all of the contact slides, mu F_N L; may be traced.
 
-        Infinite for a moment, under which nothing slides off.  Shanks of bolts hold beyond it.
+        It is per unit of width, or a total where there is a width.  Infinite for a moment, under
+        which nothing slides off.  Shanks of bolts hold beyond it.
         """
         moment = self.load.kind == "moment"
-        return np.inf if moment else gross_slip(self.get, self.member.support)
+        return np.inf if moment else self.wide * gross_slip(self.get, self.member.support)
+
+    @property
+    def wide(self) -> Any:
+        """Factor of end forces and works from what is solved to the joint; 1 without a width.
+
+        It is the width, twice for both halves of a joint in double shear.
+        """
+        width = self.strip.width
+        return 1.0 if width is None else width * halves("load.amplitude", self.member.support)
 
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""
@@ -245,11 +265,17 @@ class Scene(Tree):
         heading, name = key.split(".")
         if key == "contact.law":
             return law_name(self.contact.law)
-        return getattr(getattr(self, heading), name)
+        value = getattr(getattr(self, heading), name)
+        width = self.strip.width
+        if width is None or value is None or not is_total(key, self.load.control):
+            return value
+        return times(key, value, width * halves(key, self.member.support))
 
     @np.errstate(over="ignore")  # rules refuse what is not finite
     def number(self, key: str, others: Mapping[str, Any] = MappingProxyType({})) -> np.ndarray:
         """Number or table of a dotted key in double precision, for the rules of `domain`.
+
+        Forces are those of one unit of width.
 
         Parameters
         ----------
@@ -257,12 +283,15 @@ class Scene(Tree):
         others : numbers by dotted key in place of the scene's own, as `replace` takes them; any
             shapes that broadcast
         """
-        if key in others:
-            return np.asarray(others[key], dtype=float)
         strip = self.strip
-        if strip.derives(key, others):  # quicker than by JAX
+        given = key in others
+        if not given and strip.derives(key, others):  # quicker than by JAX
             return np.asarray(follows(key, lambda key: self.number(key, others), strip.plane))
-        return np.asarray(self.get(key), dtype=float)
+        number = np.asarray(others[key] if given else self.get(key), dtype=float)
+        if strip.width is None or number.ndim > 1 or not is_total(key, self.load.control):
+            return number
+        width = np.asarray(others.get(WIDTH_OF_ALL, strip.width), dtype=float)
+        return number / (width * halves(key, self.member.support))
 
     def replace(self, values: Mapping[str, Any]) -> Scene:
         """Copy with other values, such as ``scene.replace({"contact.friction": 0.2})``.
@@ -271,10 +300,14 @@ class Scene(Tree):
         gradients and batches reach every number of the scene.  What was given last stays given:
         after ``strip.youngs_modulus`` a new height keeps E, after ``strip.axial_stiffness`` E' 2H.
 
+        Where there is a ``strip.width``, forces and stiffnesses are totals, those of bolts too.
+        They stay given under another width; pressures that are no bolts' stay as stresses.
+
         Raises
         ------
         InputError
-            if a key does not exist, or a value is no good
+            if a key does not exist, a value is no good, or a scene gets its first width without
+            new values for its forces, see `of_width`
         """
         mapping = isinstance(values, Mapping)
         require("values", values, mapping, "give a dictionary, such as {'contact.friction': 0.2}")
@@ -286,11 +319,12 @@ class Scene(Tree):
         if is_traced(values.get(KAPPA_S)) and may_be_elastic(self):
             return self.serving([KAPPA_S]).replace(values)
         parts: dict[str, dict[str, Any]] = {heading: {} for heading in PARTS}
-        for key, value in values.items():
+        factor = pressure_factor(self, values)
+        for key, value in per_width(self, values).items():
             heading, name = key.split(".")
             parts[heading][name] = value
         contact = parts["contact"]
-        self._say_pressures(parts)
+        self._say_pressures(parts, factor)
         if "law" in contact or "smoothing" in contact:
             contact["law"] = _make_law(self.contact.law, contact)
         # An amplitude of another control or kind has another unit: it must be given anew.
@@ -304,7 +338,21 @@ class Scene(Tree):
         }
         return dataclasses.replace(self, **new_parts)
 
-    def _say_pressures(self, parts: dict[str, dict[str, Any]]) -> None:
+    def of_width(self, width: Any) -> Scene:
+        """Same joint of a width, its forces totals then; None is one unit of width.
+
+        What the scene says for one unit of width stays, but its sides become free: with a width it
+        is in plane stress unless ``strip.plane`` is given.
+
+        Examples
+        --------
+        >>> scene = Scene().of_width(50.0)
+        >>> round(float(scene.get("load.amplitude")), 3)
+        39.275
+        """
+        return dataclasses.replace(self, strip=self.strip.changed(width=width))
+
+    def _say_pressures(self, parts: dict[str, dict[str, Any]], factor: Any) -> None:
         """Say the pressures of bolts, of which the bottom one follows the member's support.
 
         It does so until it is given itself, or another pressure takes the place of the bolts.
@@ -312,10 +360,14 @@ class Scene(Tree):
         Parameters
         ----------
         parts : new values by heading and name
+        factor : factor of the pressures of bolts that stay while the width changes; None is 1
         """
         contact, member = parts["contact"], parts["member"]
-        bolted = "bolts" in contact
-        if bolted:
+        bolted = "bolts" in contact or factor is not None
+        if factor is not None:
+            x, pressure = self.contact.pressure.T
+            contact["pressure"] = jnp.stack([x, factor * pressure], axis=1)
+        elif bolted:
             rows = leaf_of("contact.bolts", contact.pop("bolts"))
             length = as_leaf(parts["strip"].get("length", self.strip.length), "strip.length")
             contact["pressure"] = bolt_pressure(rows, length)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.summary import Summary
-from jbeamshell.mechanics.friction import law_name
+from jbeamshell.mechanics.homogeneous import PLANES
 from jbeamshell.scene import mounting
 from jbeamshell.scene.forms import HOLDERS
 from jbeamshell.scene.keys import TABLE, unit_of
-from jbeamshell.scene.linearisation import Parts
+from jbeamshell.scene.linearisation import Parts as Plain
 from jbeamshell.scene.planning import in_words
 
 ALWAYS = {
@@ -20,6 +20,12 @@ ALWAYS = {
     *("contact.friction", "contact.pressure", "load.control", "load.amplitude"),
 }
 TITLE = ("model.section", "model.kinematics", "model.nodes")
+
+
+class Parts(Plain, Protocol):
+    """Scene, whose values are read by their keys."""
+
+    def get(self, key: str) -> Any: ...
 
 
 def summary(scene: Parts, own_energy: bool) -> Summary:
@@ -35,12 +41,12 @@ def summary(scene: Parts, own_energy: bool) -> Summary:
         follows = name == "contact.bolts" or scene.strip.derives(name)
         if follows or name in TITLE:
             continue
-        heading, field = name.split(".")
-        value = getattr(getattr(scene, heading), field)
-        value = law_name(value) if name == "contact.law" else value
-        if value is None or not (name in ALWAYS or _differs(value, key.default)):
+        value = scene.get(name)
+        plane = name == "strip.plane" and value != PLANES[0]
+        if value is None or not (name in ALWAYS or plane or _differs(value, key.default)):
             continue
-        unit = unit_of(name, scene.load) if key.kind == "number" else ""
+        whole = scene.strip.width is not None
+        unit = unit_of(name, scene.load, whole) if key.kind == "number" else ""
         rows.append((name, _shown(value) + (f"  [{unit}]" if unit not in ("", "1") else "")))
     energy = " with a strain energy of its own" * own_energy
     title = f"Strip{energy}: {scene.plan}"

@@ -19,7 +19,9 @@ from jbeamshell.scene.keys import KEYS, LENGTHS, NUMBERS, TWINS
 from jbeamshell.scene.parts import PARTS, Load
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.width import halves, is_total
 
+NEIGHBOURS = 4  # numbers on both sides of a total, of which one gives the same scene
 FEW_DIGITS = {4: 6, 8: 12}  # of a number that somebody wrote, by the bytes of its precision
 
 
@@ -100,10 +102,12 @@ def scene_to_toml(scene: Scene) -> str:
     for key in KEYS:
         heading, name = key.split(".")
         value = bolts[key] if key in bolts else scene.get(key)
+        if key == "strip.plane":
+            value = scene.strip.given_plane
         if value is None or scene.strip.derives(key):  # such as no layers
             continue
         if key in NUMBERS:
-            value = _shortest(value)
+            value = _shortest(_total(scene, key, value))
         if key == "contact.smoothing" and np.isinf(value):
             value = "sharp"
         tables[heading][name] = list(value) if isinstance(value, tuple) else value
@@ -115,7 +119,7 @@ def _bolts(scene: Scene) -> dict[str, Any]:
     given, none = scene.contact, {"contact.bolts": None}
     if given.bolts is None:
         return none
-    rows = _rounded(given.bolts)
+    rows = _rounded(scene.get("contact.bolts"))
     copy = scene.replace({"contact.bolts": rows}).contact
     if not np.array_equal(copy.pressure, given.pressure):
         return none
@@ -131,6 +135,23 @@ def _rounded(value: Any) -> NDArray[Any]:
     digits = FEW_DIGITS[array.dtype.itemsize]
     few = [float(f"{number:.{digits}g}") for number in array.ravel()]
     return np.asarray(few, array.dtype).reshape(array.shape)
+
+
+def _total(scene: Scene, key: str, value: Any) -> Any:
+    """Number that gives the same scene to the last bit: a total is rounded as it is divided."""
+    width = scene.strip.width
+    if width is None or key == "contact.bolts" or not is_total(key, scene.load.control):
+        return value
+    heading, name = key.split(".")
+    held, value = getattr(getattr(scene, heading), name), np.asarray(value)
+    near = [_rounded(value), value]
+    for way in (np.inf, -np.inf):
+        step = value
+        for _ in range(NEIGHBOURS):
+            step = np.nextafter(step, np.asarray(way, value.dtype))
+            near.append(step)
+    whole = width * halves(key, scene.member.support)
+    return next((one for one in near if one * (1.0 / whole) == held), value)
 
 
 def _shortest(value: Any) -> Any:

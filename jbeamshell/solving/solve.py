@@ -173,12 +173,12 @@ def _walked(
     strip: Strip | None = None,
 ) -> History:
     """History on the contact line, on a grid that keeps the tolerance."""
-    traced = is_traced(scene, path) or is_staged()
+    traced, by_force = is_traced(scene, path) or is_staged(), scene.load.control == "force"
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
 
     def walked(scene: Scene, strip: Strip | None = None) -> History:
-        return walk(scene, path, cycles, own=own, strip=strip)
+        return walk(scene, path, cycles, own=own, strip=strip).of_scene(scene)
 
     history = walked(scene, strip)
     if traced:
@@ -188,7 +188,7 @@ def _walked(
         history = _overhung(_refined(history, walked), path, own)
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
-        load = float(path.target[step])
+        load = float(path.target[step]) * float(scene.wide if by_force else 1.0)
         raise UnconvergedError(f"load step {step} (load {load:.6g}) has {NO_END}")
     if throw:
         warn_of_doubts(history.doubts, stacklevel=STACK + 1)
@@ -201,7 +201,7 @@ def _marched(
 ) -> History:
     """History in load steps; a failed step is taken again in pieces."""
     steps, history = _stepped((scene.in_one_form(), touching, path, np.asarray(True)), solver)
-    history = history.but(scene=scene)
+    history = history.of_scene(scene)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -210,7 +210,7 @@ def _marched(
         steps = recover(scene, steps, path, solver, initial_state(scene, touching))
         if throw:
             raise_if_failed(scene, steps, path)
-        history = history_of(scene, steps, path.pressure)
+        history = history_of(scene, steps, path.pressure).of_scene(scene)
     return history
 
 
@@ -265,8 +265,9 @@ def _overhung(history: History, path: LoadPath, own: bool) -> History:
         return history
     values: dict[str, Any] = dict.fromkeys(keys, scene.strip.length)
     values |= {"load.control": "force", "load.amplitude": np.asarray(largest)}
-    forces = path._replace(target=history.force)
-    other = walk(scene.pinned().replace(values), forces, history.cycles, own=own and by_force)
+    forces = path._replace(target=history.force / scene.wide)
+    longer = scene.pinned().replace(values)
+    other = walk(longer, forces, history.cycles, own=own and by_force).of_scene(longer)
     return history.but(overhung=ratio_of_losses(other, history))
 
 

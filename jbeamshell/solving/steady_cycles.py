@@ -22,7 +22,7 @@ CYCLE = np.array([1.0, *[-1.0, 1.0] * CYCLES])  # turns of the load, over its am
 
 
 class SteadyCycles(Tree):
-    """Steady cycles, per width.
+    """Steady cycles.
 
     Attributes
     ----------

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, require
 from jbeamshell.common.errors import InputError
 from jbeamshell.scene.domain import gross_slip, gross_slip_rule, support_rules
-from jbeamshell.scene.keys import DERIVED, NUMBERS, TABLE, check_key
+from jbeamshell.scene.keys import DERIVED, NUMBERS, TABLE, WIDTH_OF_ALL, check_key
 from jbeamshell.scene.layers import fill_height
 from jbeamshell.scene.linearisation import stretching
 from jbeamshell.scene.scene import Scene
@@ -92,8 +92,16 @@ class Lanes:
 
     @property
     def gross_slip(self) -> np.ndarray:
-        """End force at which the whole contact slides: mu times the pressures' force."""
-        return np.asarray(gross_slip(self.value, self.scene.member.support))
+        """End force per unit of width at which the whole contact slides."""
+        return self._pressed * gross_slip(self.value, self.scene.member.support)
+
+    @property
+    def _pressed(self) -> np.ndarray:
+        """Part of the scene's pressures that acts: bolts press the less, the wider the joint."""
+        varies = WIDTH_OF_ALL in self.axes and self.scene.contact.bolted
+        if not varies:
+            return np.ones(())
+        return self.scene.number(WIDTH_OF_ALL) / self.value(WIDTH_OF_ALL)
 
     @property
     def amplitude_over_height(self) -> np.ndarray:
@@ -143,7 +151,7 @@ class Lanes:
         targets = self.value("load.amplitude") if load.cycles else 0.0
         for rule in (
             *support_rules(strip, member, contact, scene.plan, load, self.value),
-            gross_slip_rule(load, member, self.value, targets),
+            gross_slip_rule(load, member, self.value, targets, self._pressed),
         ):
             yield rule.holds
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
-from jbeamshell.history.figures import TURNED_UNITS, UNITS
+from jbeamshell.history.figures import units_of
 from jbeamshell.history.reliability import doubted_from, finer_grid
 from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.load_path import check
@@ -45,7 +45,7 @@ def dataset(
 
     scene, load = lanes.scene, lanes.scene.load
     dims = ["lane"] if lanes.paired else list(lanes.axes)
-    units = UNITS | PURE | (TURNED_UNITS if load.kind == "moment" else {})
+    units, whole = units_of(scene) | PURE, scene.strip.width is not None
     errors = _errors(values, lanes.shape)
     solved = np.isin(status, (Outcome.CONVERGED, Outcome.UNDEFINED))
     doubtful = ~solved | (errors > doubted_from(scene.model.tolerance))
@@ -56,7 +56,7 @@ def dataset(
     }
     variables |= {"status": (dims, status, flags), "doubtful": (dims, doubtful, {})}
     axes: dict[str, Any] = {
-        key: ("lane" if lanes.paired else key, numbers, {"units": unit_of(key, load)})
+        key: ("lane" if lanes.paired else key, numbers, {"units": unit_of(key, load, whole)})
         for key, numbers in lanes.axes.items()
     }
     if np.any(np.isfinite(scaled := lanes.amplitude_over_height)):

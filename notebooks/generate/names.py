@@ -27,6 +27,7 @@ EXTENSIONS = (  # what one's own laws, energies and readers build on, and format
     "jbeamshell.scene.keys",
     "jbeamshell.scene.rows",
     "jbeamshell.scene.dimensions",
+    "jbeamshell.scene.bolts",
     "jbeamshell.identify.plan_file",
     "jbeamshell.identify.rig",
     "jbeamshell.identify.parameters",

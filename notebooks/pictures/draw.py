@@ -3,6 +3,7 @@
 Run ``python notebooks/pictures/draw.py``: it writes its pictures beside itself.
 """
 
+import warnings
 from pathlib import Path
 
 import jax
@@ -215,6 +216,20 @@ def first_results() -> None:
     jb.solve(jb.Scene()).plot().figure.savefig(FOLDER / "standard_loop.png", dpi=110)
     axes = jb.solve(jb.library.single_lap()).plot_deformed()
     axes.figure.savefig(FOLDER / "first_lap_joint.png", dpi=110)
+    bolted_joint()
+
+
+def bolted_joint() -> None:
+    """Bolted lap joint of the page "A drawing and no test"."""
+    jax.config.update("jax_enable_x64", True)
+    plates = {"length": "100 mm", "thickness": "8 mm", "width": "60 mm", "overhang": "100 mm"}
+    bolts = {"bolts": "2xM8@30mm,70mm", "torque": "25 N m", "friction": 0.2, "force": "4 kN"}
+    joint = jb.LapJoint("single-lap", modulus="210 GPa", **plates, **bolts)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jb.DoubtfulWarning)
+        axes = joint.solve().plot_joint()
+    plotting.in_units(axes, {"length": "m", "force": "N", "stress": "Pa"})
+    axes[0, 0].figure.savefig(FOLDER / "bolted_joint.png", dpi=110)
 
 
 if __name__ == "__main__":

@@ -54,7 +54,7 @@ class TestScenes:
         rows = [[0.5, 0.0], [0.5, 20.0], [1.5, 20.0], [1.5, 0.0]]
         fine = {"model.section": "plane", "model.nodes": 129}  # for the smallest load
         scene = jb.Scene().replace(fine | {"contact.pressure": rows})
-        found = four_parameters(scene, width=3.0)
+        found = four_parameters(scene.of_width(3.0))
         assert float(found.law.slip_force) == pytest.approx(6.0)
         assert np.median(np.abs(found.dissipation_error)) < 0.12
         assert np.max(np.abs(found.displacement_error)) < 0.05

@@ -20,7 +20,7 @@ MASING = {
 @pytest.mark.parametrize("name", MASING)
 def test_a_joint_has_the_loops_of_its_law(name):
     law = MASING[name]
-    joint = Joint.of(law, width=3.0)
+    joint = Joint.of(law).times(3.0)
     slides = float(joint.displacements[-2])
     size = slides * np.geomspace(1e-3, 4.0, 57)
     lost = 3.0 * np.asarray(law.dissipation(size))

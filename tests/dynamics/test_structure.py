@@ -59,7 +59,7 @@ class TestJoint:
 
     def test_a_strips_loops_are_its_own(self):
         """The path of the displacement gives back any path of nested reversals of the force."""
-        joint = Joint.of(PLANE, 1.2, width=3.0)
+        joint = Joint.of(PLANE, 1.2).times(3.0)
         history = jb.solve(PLANE, LOADS)
         u = np.asarray(history.displacement - history.displacement[history.pressed])[-len(LOADS) :]
         # A loop within a loop closes where its load comes back; driven by u, where its u does.
@@ -70,7 +70,7 @@ class TestJoint:
         """Short slip, a tall strip: the nodes' own thresholds would be off by factors."""
         tall = {"strip.height_ratio": 0.34, "contact.friction": 0.2, "strip.poisson_ratio": 0.16}
         scene = PLANE.replace(tall | {"load.entry": entry, "load.amplitude": 1.05})
-        joint = Joint.of(scene, width=3.0)
+        joint = Joint.of(scene).times(3.0)
         assert float(joint.forces[-1]) == pytest.approx(3.15)
         own = jb.response(scene, ["load.amplitude"], ["dissipation", "secant_stiffness"])
         for part in (1.0, 0.6, 0.1):
@@ -118,7 +118,7 @@ class TestJoint:
     def test_a_strip_of_load_steps_has_its_own_steady_cycles(self):
         coarse = {"model.kinematics": "linear", "model.nodes": 21, "contact.normal": "held"}
         strip = STRIP.replace(coarse)
-        joint = Joint.of(strip, 1.0, width=2.0)
+        joint = Joint.of(strip, 1.0).times(2.0)
         loop = jb.solve(strip.replace({"load.amplitude": 1.0}))
         u = 0.5 * float(jnp.max(loop.displacement) - jnp.min(loop.displacement))
         assert float(joint.forces[-1]) == 2.0
@@ -158,7 +158,7 @@ class TestReach:
         assert np.max(np.abs(cut.value.motion.displacement[known, 0])) <= 4.0
 
     def test_a_joint_that_was_followed_to_gross_slip_slides(self):
-        joint = Joint.of(PLANE, 1.99, width=3.0)
+        joint = Joint.of(PLANE, 1.99).times(3.0)
         end = float(joint.displacements[-2])
         np.testing.assert_allclose(joint.backbone(jnp.array([9.0, 50.0]) * end), 5.97, rtol=1e-9)
         slid = float(joint.dissipation(9.0 * end) - joint.dissipation(end))
@@ -227,7 +227,7 @@ class TestModes:
         def curve(values):
             mu, eta, width, series, mass, spring, ratio = values
             scene = strip.replace({"contact.friction": mu, "strip.height_ratio": eta})
-            joint = Joint.of(scene, 1.2, width=width).in_series(1e5 * series)
+            joint = Joint.of(scene, 1.2).times(width).in_series(1e5 * series)
             masses = mass * jnp.array([[1.0, 0.0], [0.0, 0.3]])
             springs = 1e5 * spring * jnp.array([[1.0, -1.0], [-1.0, 1.5]])
             attached = [Attachment(joint, 0)]
@@ -360,7 +360,7 @@ def test_a_displacement_driven_scene_gives_the_joint_of_its_forces():
 
 
 def test_pull_and_push_each_have_their_backbone():
-    joint = Joint.of(PLANE, 1.2, width=3.0)
+    joint = Joint.of(PLANE, 1.2).times(3.0)
     assert joint.sides is not None
     pull, push = (float(joint.backbone(way * 1e-5, mean=False)) for way in (1.0, -1.0))
     assert pull > float(joint.backbone(1e-5)) > -push > 0.0  # a pull presses the corner down

@@ -71,8 +71,8 @@ def test_amplitudes_are_those_of_the_point():
 
 
 def test_a_wider_strip_and_more_mass_are_what_they_say(monkeypatch):
-    def of(scene, force, width):  # any joint; those of scenes are tested elsewhere
-        return Joint(FORCE, width * FORCE)
+    def of(scene, force):  # any joint; those of scenes are tested elsewhere
+        return Joint(FORCE, FORCE)
 
     monkeypatch.setattr(Joint, "of", of)
     model = Assembly.of(jb.Scene(), [[2.0]], [[1e4]], width=3.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import jbeamshell as jb
 from jbeamshell.cli.main import main
 from jbeamshell.common.errors import InputError
-from jbeamshell.scene.dimensions import HALF_ANGLE, PRELOAD, STRESS_AREA, dimensions_of
+from jbeamshell.scene.dimensions import dimensions_of
 from jbeamshell.scene.pressure import check_pressure, face_resultant
 
 STRIP = {"length": "120 mm", "thickness": "12mm", "width": "50mm", "modulus": "210 GPa"}
@@ -40,14 +40,15 @@ def test_dimensions_are_converted_to_si():
     assert float(scene.strip.axial_stiffness) == pytest.approx(210e9 * 0.012 / (1.0 - 0.09))
 
 
-def test_a_bolt_presses_where_its_cone_meets_the_contact():
+def test_a_bolt_presses_on_a_patch_with_the_second_moment_of_its_ring():
     pressure = table(bolts="8kN@60mm", head="13mm")
-    reach = 0.5 * 0.013 + 0.012 * math.tan(math.radians(30.0))
+    reach = 0.5 * math.sqrt(0.75 * (0.013**2 + 0.00975**2))
     on = pressure[pressure[:, 1] > 0.0]
     np.testing.assert_allclose(on[:, 0], [0.06 - reach, 0.06 + reach])
     np.testing.assert_allclose(on[:, 1], 8e3 / 0.05 / (2.0 * reach))
-    assert on[-1, 0] - on[0, 0] == pytest.approx(26.86e-3, rel=1e-3)  # as the page says
-    assert math.degrees(HALF_ANGLE) == pytest.approx(30.0)
+    radius = np.sqrt(np.linspace(0.00975**2, 0.013**2, 4001)) / 2.0  # equal areas
+    middle = 0.5 * (radius[1:] ** 2 + radius[:-1] ** 2)
+    assert np.mean(middle) / 2.0 == pytest.approx((2.0 * reach) ** 2 / 12.0, rel=1e-6)
 
 
 @given(
@@ -61,7 +62,7 @@ def test_bolts_keep_their_force_where_patches_overlap_or_end(places, force, head
     check_pressure("contact.pressure", pressure)
     total, moment = face_resultant(pressure, 0.12)
     assert total == pytest.approx(len(places) * force * 1e3 / 0.05)
-    reach = 0.5e-3 * head + 0.012 * math.tan(HALF_ANGLE)
+    reach = 0.5e-3 * head * math.sqrt(0.75 * (1.0 + 0.75**2))
     centres = [
         0.5 * (max(1e-3 * place - reach, 0.0) + min(1e-3 * place + reach, 0.12)) for place in places
     ]
@@ -74,9 +75,10 @@ def test_kinds_of_bolts_add_up_and_a_usual_head_is_told():
     assert total == pytest.approx(36e3 / 0.05)
     np.testing.assert_array_equal(both, table(bolts=["2x8kN@30mm,90mm", "20 kN @ 60 mm"]))
     known = dimensions_of(STRIP | {"bolts": "2x8kN@30mm,90mm"})
-    assert PRELOAD * STRESS_AREA[6e-3] > 8e3 > PRELOAD * STRESS_AREA[5e-3]
+    large, small = (jb.Bolt(size, proof=0.75).preload for size in ("M6", "M5"))
+    assert large > 8e3 > small
     assert known.notes == (
-        "bolts 2x8kN@30mm,90mm: a head of 9 mm is taken, that of the smallest 8.8 bolt for this "
+        "bolts 2x8kN@30mm,90mm: a head of 8.88 mm is taken, that of the smallest 8.8 bolt for this "
         "preload: give head to change it",
     )
 
@@ -126,7 +128,7 @@ def test_a_plan_and_the_command_take_dimensions(tmp_path, capsys):
         (loop,) = case.measurements
         assert np.max(loop.force) == pytest.approx(4e3 / 0.05, rel=0.01)
         assert loop.units["force"] == "N/m"
-        assert any("head of 9 mm" in note for note in plan.notes)
+        assert any("head of 8.88 mm" in note for note in plan.notes)
     (tmp_path / "plan.toml").write_text(f"{text}width = 0.05\n", "utf-8")
     with pytest.raises(InputError, match=r"width = 0.05: is given twice"):
         jb.identify.read_plan(tmp_path / "plan.toml")

@@ -63,7 +63,10 @@ class Inertia(eqx.Module):
         number("inertia.damping_stiffness", self.damping_stiffness, NOT_NEGATIVE, low=-TINY)
 
     def check(self, scene: Scene) -> None:
-        """Raise `InputError` for a scene with another number of layers."""
+        """Raise `InputError` for a scene with another number of layers, or with a width."""
+        fix = "masses and forces of a strip that vibrates are per unit of width: take "
+        fix += "scene.of_width(None), or Joint.of(scene) in a structure"
+        require("strip.width", scene.strip.width, scene.strip.width is None, fix)
         layers = 1 if scene.strip.layers is None else scene.strip.layers.shape[0]
         fits = self.density.ndim == 0 or self.density.shape == (layers,)
         require("inertia.density", self.density, fits, DENSITY)

@@ -56,7 +56,7 @@ class Joint(ParallelIwan):
     ----------
     displacements, forces : (k,) points of the backbone.  At .99 of the capacity or more a point on
         the plateau of gross slip follows the given ones
-    width : of the strip
+    width : width whose forces these are; 1 where they are those of one unit of it
     capacity : force of gross slip; infinite if it is not known
     sides : (2, k) displacements of a first pull and of a first push at the forces; None if they are
         the backbone's
@@ -113,7 +113,7 @@ class Joint(ParallelIwan):
         require("joint.forces", f, rising and softening and slopes[0] > 0.0, BACKBONE)
 
     @classmethod
-    def of(cls, scene: Scene | Law, force: Any = None, *, width: Any = 1.0) -> Joint:
+    def of(cls, scene: Scene | Law, force: Any = None) -> Joint:
         """Joint whose loops are nearest to the steady cycles of a scene, or those of a law.
 
         Displacement and energy of the cycles are matched from a fiftieth of the largest force on.
@@ -130,15 +130,15 @@ class Joint(ParallelIwan):
         Parameters
         ----------
         scene : scene of the strip or the lap joint, whose load path is not used; or law
-        force : largest end force per width, below gross slip; None is ``scene.load.amplitude``, and
-            gross slip of a law, or the largest force to which it was fitted
-        width : width of the strip, by which forces are multiplied
+        force : largest end force, below gross slip, as the scene has forces: a total where it has
+            a ``strip.width``.  None is ``load.amplitude``, and gross slip of a law, or the largest
+            force to which it was fitted
 
         Raises
         ------
         InputError
-            for a force or a width that is not positive, a force beyond gross slip, or a law without
-            Masing's memory
+            for a force that is not positive, a force beyond gross slip, or a law without Masing's
+            memory
         UnconvergedError
             for a scene without equilibrium
 
@@ -146,28 +146,25 @@ class Joint(ParallelIwan):
         --------
         >>> joint = Joint.of(jb.Scene(), 1.2)
         >>> joint.dissipation(joint.displacements[-1])  # energy per cycle
-        >>> Joint.of(jb.laws.Iwan4(slip_force=2.0, stiffness=100.0), width=3.0)
+        >>> Joint.of(jb.laws.Iwan4(slip_force=2.0, stiffness=100.0)).times(3.0)
         """
         if isinstance(scene, Law):
-            require_number("width", width)
-            capacity = width * scene.capacity
+            capacity: Any = scene.capacity
             if force is None and np.isfinite(scene.fitted_to):
                 force = jnp.minimum(scene.backbone(scene.fitted_to), NEARLY * scene.capacity)
                 capacity = np.inf  # which no data showed
             u, f = backbone_points(scene, force)
-            return cls(u, width * f, width, capacity)
+            return cls(u, f, 1.0, capacity)
         force = largest_force(scene, force)
         if scene.load.control != "force":
-            load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
-            scene = dataclasses.replace(scene, load=load)
-        require_number("width", width)
+            scene = scene.replace({"load.control": "force", "load.amplitude": force})
         bolted = scene.member.bolt_stiffness is not None  # which holds beyond
-        capacity = np.inf if bolted else width * scene.gross_slip
+        capacity = np.inf if bolted else scene.gross_slip
         u, f, sides = steady_backbone(scene, as_leaf(force, "force"))
         traced = is_traced(scene, force)
         walked = scene if scene.plan.on_contact_line and not traced else None
         mounting = "" if traced else in_words(scene)
-        return cls(u, width * f, width, capacity, sides, walked, mounting)
+        return cls(u, f, _own_width(scene), capacity, sides, walked, mounting)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
@@ -183,6 +180,23 @@ class Joint(ParallelIwan):
         """
         u, f, about = table.read(path)
         return cls(u, f, **about)
+
+    def times(self, number: Any) -> Joint:
+        """So many of the joint side by side: forces times a number, such as a width.
+
+        Raises
+        ------
+        InputError
+            for a number that is not positive
+
+        Examples
+        --------
+        >>> Joint([1.0, 3.0], [1.0, 2.0]).times(10.0).forces.tolist()
+        [10.0, 20.0]
+        """
+        require_number("number of joints", number)
+        names = ("forces", "width", "capacity")
+        return self.but(**{name: number * getattr(self, name) for name in names})
 
     def in_series(self, stiffness: Any) -> Joint:
         """Joint with a spring in series, which its points then contain.
@@ -254,8 +268,9 @@ class Joint(ParallelIwan):
         """Words of an error at a displacement beyond the reach, with the fix."""
         capacity, top = float(self.capacity), float(self.forces[-1])
         if np.isfinite(capacity):
-            level = 0.5 * (1.0 + GROSS) * capacity / float(self.width)
-            fix = f"give Joint.of the force {level:.6g} per width, or points up to there: this is "
+            own = 1.0 if self.scene is None else float(_own_width(self.scene))
+            level = 0.5 * (1.0 + GROSS) * capacity / float(self.width) * own
+            fix = f"give Joint.of the force {level:.6g}, or points up to there: this is "
             fix += "nearly gross slip, beyond which the force is known"
         else:
             fix = "give more points or, of a law, a larger force; or give "
@@ -316,7 +331,8 @@ class Joint(ParallelIwan):
         """
         points = as_path(path)
         if self.scene is not None and not is_traced(self.scene):
-            return self.width * walked_forces(self.scene, np.asarray(points))
+            number = self.width / _own_width(self.scene)
+            return number * walked_forces(self.scene, np.asarray(points))
         return super().path_forces(self._where_known(points, points))
 
     def export(
@@ -350,7 +366,7 @@ class Joint(ParallelIwan):
         --------
         ::
 
-            Joint.of(scene, 1.2, width=30.0).export("opensees", "joint.py", units=("mm", "N"))
+            Joint.of(scene.of_width(30.0), 36.0).export("opensees", "joint.py", units=("mm", "N"))
         """
         require("joint", "traced", not is_traced(self), "export it outside jit, grad and vmap")
         words = isinstance(units, tuple | list) and len(units) == 2 and all(map(_is_word, units))
@@ -377,9 +393,17 @@ class Joint(ParallelIwan):
         if np.isfinite(self.capacity):
             rows.append(("gross slip", with_unit(float(self.capacity))))
         rows.append(("pull and push", f"differ from their mean by {float(self.asymmetry):.2%}"))
-        rows.append(("width", with_unit(float(self.width))))
+        rows.append(("width", with_unit(float(self.width)) + self._forces))
         notes = [self.mounting] if self.mounting else []
         return Summary(f"joint of {count} slider{'s' * (count != 1)}", rows, notes)
+
+    @property
+    def _forces(self) -> str:
+        """Words for what the forces of a scene are; empty where nothing is known of its width."""
+        if self.scene is None:
+            return ""
+        per_unit = self.scene.strip.width is None and float(self.width) == 1.0
+        return ", forces per unit of width" if per_unit else ", forces are totals"
 
     def __str__(self) -> str:
         return self.summary.as_text()
@@ -399,18 +423,26 @@ class Joint(ParallelIwan):
         return rising and float(f[-1]) >= GROSS * float(self.capacity)
 
 
+def _own_width(scene: Scene) -> Any:
+    """Width of a scene, 1 where its forces are those of one unit of it."""
+    return 1.0 if scene.strip.width is None else scene.strip.width
+
+
 def largest_force(scene: Scene, force: Any = None) -> Any:
-    """Force up to which a joint is wanted, checked; None is the scene's amplitude."""
+    """Force up to which a joint is wanted, checked; None is the scene's amplitude.
+
+    It is a total where the scene has a width.
+    """
     key = "force" if force is not None else "load.amplitude"
     if force is None:
         control = scene.load.control
         fix = "is no force: give force=, or take load.control = 'force'"
         require("load.amplitude", scene.load.amplitude, control == "force", fix)
-        force = scene.load.amplitude
+        force = scene.get("load.amplitude")
     require_number("force", force)
     if not is_traced(scene, force):
         by_force = dataclasses.replace(scene.load, control="force")
-        rule = gross_slip_rule(by_force, scene.member, scene.number, force)
+        rule = gross_slip_rule(by_force, scene.member, scene.number, force / scene.wide)
         limit = float(scene.gross_slip)
         fix = f"must stay below gross slip, mu F_N L = {limit:.6g}: take less, such as half of it, "
         rule._replace(key=key, fix=f"{fix}{0.5 * limit:.4g}").demand()

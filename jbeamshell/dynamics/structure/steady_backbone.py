@@ -125,7 +125,7 @@ _active_once = jax.jit(_active)
 
 
 def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
-    """Forces (T,) per width of a scene on its contact line, walked event by event."""
+    """Forces (T,) of a scene on its contact line, walked event by event."""
     size = max(float(np.max(np.abs(path), initial=0.0)), np.finfo(float).tiny)
     driven = scene.replace({"load.control": "displacement", "load.amplitude": size})
     return run(driven, path).force[-path.size :]
