@@ -80,10 +80,15 @@ def test_a_lap_joint_rings_down_by_its_sliders(capsys):
 
 
 def test_export_writes_a_joint(cli, tmp_path):
-    path = tmp_path / "joint.csv"
-    words = ["--width", "30", "--units", "mm, N", "--force", "1.2", "--out", path]
-    code, out, err = cli("export", *PLANE[:6], "--to", "table", *words)
+    path, scene = tmp_path / "joint.csv", tmp_path / "wide.toml"
+    scene.write_text(
+        "[strip]\nwidth = 1.5\naxial_stiffness = 1e6\n[load]\nentry = 'traction'\n", "utf-8"
+    )
+    words = ["--units", "mm, N", "--force", "1.8", "--out", path]
+    code, out, err = cli("export", scene, *PLANE[:6], "--to", "table", *words)
     assert (code, out) == (0, "")
     assert err == f"wrote {path}\n"
     assert "u in mm, F in N" in path.read_text()
-    assert float(Joint.read(path).forces[-1]) == pytest.approx(36.0)
+    joint = Joint.read(path)
+    assert float(joint.forces[-1]) == pytest.approx(1.8)
+    assert float(joint.width) == 1.5

@@ -330,7 +330,7 @@ REFUSED = {
     "to itself": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 0, 0)]), "attachm"),
     "stiffening": (lambda: Joint([1.0, 2.0], [1.0, 3.0]), "softening"),
     "falling": (lambda: Joint([2.0, 1.0], [1.0, 3.0]), "rising"),
-    "width": (lambda: Joint.of(PLANE, 1.2, width=0.0), "width = 0.0"),
+    "times": (lambda: JOINT.times(0.0), "number of joints = 0.0"),
     "beyond gross slip": (lambda: Joint.of(PLANE, 2.5), "force = 2.5.*gross slip"),
     "no force": (
         lambda: Joint.of(PLANE.replace({"load.control": "displacement", "load.amplitude": 1e-5})),
