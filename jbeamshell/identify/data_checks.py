@@ -28,12 +28,6 @@ DISSIPATES = 1e-3  # work over that of the rectangle about a loop, below which t
 def inspected(cases: Sequence[Case], free: Sequence[str], unchecked: bool = False) -> list[str]:
     """Doubts about the loops of cases, see `jbeamshell.inspect`.
 
-    Parameters
-    ----------
-    cases : models and what was measured
-    free : keys to fit, which say nothing of the loops yet
-    unchecked : True to tell grave findings as doubts
-
     Raises
     ------
     InputError

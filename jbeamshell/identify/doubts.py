@@ -55,13 +55,8 @@ def doubts_of(
 ) -> list[str]:
     """Sentences on what to know before using the values of a fit.
 
-    Parameters
-    ----------
-    problem : least-squares problem
-    uncertainty : uncertainty at the end of the fit
-    models : model of each specimen with the fitted values
-    left : misfit of each measurement that is no white noise
-    minima : cost at the end of each search, the best first
+    ``left`` are the misfits of the measurements that are no white noise, ``minima`` the costs at
+    the ends of the searches, the best first.
     """
     space, rows, point = problem.space, problem.weight.size, uncertainty.point
     values, best = space.values(point).tolist(), problem(point)
@@ -106,14 +101,7 @@ def doubts_of(
 
 
 def undescribed(problem: Problem, left: Sequence[float], prediction: Vector) -> list[str]:
-    """Sentence on what a model does not describe; none if it describes all data.
-
-    Parameters
-    ----------
-    problem : measurements, with their labels
-    left : misfit of each measurement that is no white noise
-    prediction : (rows,) response of the model
-    """
+    """Sentence on what a model does not describe; none if it describes all data."""
     limits = [LIMITS[measurement.form.scale] for measurement in problem.measurements]
     worst = int(np.argmax(np.divide(left, limits)))
     said = []

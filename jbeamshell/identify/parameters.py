@@ -25,7 +25,8 @@ from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.rows import Key
 
 SCALES = ("log", "linear")
-FARTHEST = 40.0  # largest coordinate; beyond it exp overflows or vanishes
+FARTHEST = 40.0  # largest coordinate and logarithm without a bound; exp overflows or vanishes
+ON_BOUND = 20.0  # coordinate on a bound: a number stays inside, by e^-20 of the way to its start
 AT_BOUND = 1e-3  # distance from a bound, over that of both, below which a fit ended at it
 
 PREFIX = "rig."
@@ -113,9 +114,7 @@ class Coordinate(NamedTuple):
     def at(self, p: Any) -> tuple[Any, Any]:
         """Number at a coordinate, and its derivative; both may be traced."""
         numbers, (start, low, high) = jnp if isinstance(p, Array) else np, self._ends
-        bounded = np.isfinite(low), np.isfinite(high)
-        if self.log or any(bounded):
-            p = numbers.clip(p, -FARTHEST, FARTHEST)
+        bounded, p = (np.isfinite(low), np.isfinite(high)), numbers.clip(p, *self._reach)
         if all(bounded):
             part = 1.0 / (1.0 + numbers.exp(-p - logit((start - low) / (high - low))))
             t, dt = low + (high - low) * part, (high - low) * part * (1.0 - part)
@@ -127,23 +126,25 @@ class Coordinate(NamedTuple):
             t = high - dt
         else:
             t, dt = start + self.unit * p, self.unit + 0.0 * p
-        x = numbers.clip(numbers.exp(t), self.low, self.high) if self.log else t  # but for rounding
-        return x, dt * x if self.log else dt
+        if not self.log:
+            return t, dt
+        x = numbers.exp(numbers.clip(t, start - FARTHEST, start + FARTHEST))
+        x = numbers.clip(x, self.low, self.high)  # but for rounding
+        return x, dt * x
 
     def of(self, x: float) -> float:
         """Coordinate of a number; numbers on or beyond a bound are moved inside."""
         (start, low, high), t = self._ends, self._scaled(x)
         if np.isfinite(low) and np.isfinite(high):
-            p = logit((t - low) / (high - low)) - logit((start - low) / (high - low))
+            p = logit(np.clip((t - low) / (high - low), 0.0, 1.0))
+            p = p - logit((start - low) / (high - low))
         elif np.isfinite(low):
             p = np.log((t - low) / (start - low)) if t > low else -FARTHEST
         elif np.isfinite(high):
             p = -np.log((high - t) / (high - start)) if t < high else FARTHEST
         else:
             p = (t - start) / self.unit
-            if not self.log:
-                return float(p)
-        return float(np.clip(p, -FARTHEST, FARTHEST))
+        return float(np.clip(p, *self._reach))
 
     def between(self, part: float) -> float:
         """Coordinate at a part of the way from bound to bound, on the scale of the number.
@@ -166,6 +167,15 @@ class Coordinate(NamedTuple):
     def unit(self) -> float:
         """Unit of the scale: a factor e of a logarithm, else the size of the start."""
         return 1.0 if self.log or self.start == 0.0 else abs(self.start)
+
+    @property
+    def _reach(self) -> tuple[float, float]:
+        """Least and largest coordinate."""
+        _, low, high = self._ends
+        if not (self.log or np.isfinite(low) or np.isfinite(high)):
+            return -np.inf, np.inf
+        below, above = (ON_BOUND if np.isfinite(b) else FARTHEST for b in (low, high))
+        return -below, above
 
     @property
     def _ends(self) -> tuple[float, float, float]:

@@ -198,12 +198,7 @@ class Problem:
         return found
 
     def traced_cost(self, values: Array) -> tuple[Array, Array]:
-        """Sum of the squared residuals of the data and its derivatives (n,), as traced functions.
-
-        Parameters
-        ----------
-        values : (n,) parameters, which may be traced
-        """
+        """Sum of the squared residuals of the data at values (n,), and its derivatives (n,)."""
         cost, slopes, table = jnp.zeros(()), jnp.zeros_like(values), self.space.table
         responses = self.runs.traced(values[table])
         for owner, rows, (residual, jacobian, *_) in zip(

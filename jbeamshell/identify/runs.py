@@ -72,15 +72,9 @@ class Runs:
         keys: tuple[str, ...],
         solver: Newton,
     ) -> None:
-        """Set the runs up.
+        """Set up the run of each observation on the model of its specimen, by number in ``owners``.
 
-        Parameters
-        ----------
-        observations : runs of the model, one for each measurement
-        models : model of each specimen
-        owners : specimen of each observation
-        keys : (k,) dotted keys of the numbers that change
-        solver : settings of Newton's method
+        ``keys`` are the dotted keys (k,) of the numbers that change.
         """
         served = [model.serving(keys) for model in models]
         self.pairs = [(_filled(o), served[i]) for o, i in zip(observations, owners, strict=True)]

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import numpy as np
 
@@ -154,12 +154,6 @@ def said(
 ) -> SaidStrip | SaidLaw | SaidModel:
     """What a specimen says of its model, with its dimensions and values.
 
-    Parameters
-    ----------
-    specimen : specimen as a user gives it
-    dimensions : its dimensions by dotted key
-    folder : folder in which the file of a scene is looked for
-
     Raises
     ------
     InputError
@@ -193,12 +187,6 @@ def driven(
 
     A law is driven by the displacement, as it has a force for each; by the force where curves over
     amplitude are all there is, or where loops know the noise of their displacement alone.
-
-    Parameters
-    ----------
-    law : law, or its class
-    measurements : what was measured
-    control : column that drives it; None chooses as above
     """
     pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
     backward = any(
@@ -257,7 +245,7 @@ def _told(law: Law, data: Sequence[Measurement], keys: Sequence[str]) -> list[st
     return [key for key in keys if np.any(np.asarray(slopes[key]) != 0.0)]
 
 
-@eqx.filter_jit(compiler_options=ONCE)
+@partial(jax.jit, compiler_options=ONCE)
 def _slopes(law: Law, numbers: dict[str, Any], way: Any) -> dict[str, Any]:
     """Derivatives of a law's backbone by numbers of dotted keys."""
     slopes: dict[str, Any] = jax.jacfwd(lambda own: law.replace(own).backbone(way))(numbers)

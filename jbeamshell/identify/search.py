@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from jbeamshell.common.errors import InputError, UnconvergedError
+from jbeamshell.identify.parameters import ON_BOUND
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.runs import Evaluation
 from jbeamshell.identify.search_space import SearchSpace
@@ -25,7 +26,6 @@ NEAR = 1e-10  # the same of a search on a bound, which begins near its end
 GRADIENT = 1e-10  # slope of the cost below which a search has converged, as where nothing is left
 SCREENED = 4  # random points tried for each start besides the given one
 NO_INFLUENCE = 1e-9  # change of a residual for a unit step below which it is rounding
-ON_BOUND = 20.0  # coordinate of a number on its bound: e^-20 of the way to the start is left
 
 Vector = NDArray[np.float64]
 

@@ -78,11 +78,6 @@ def search_space(
 ) -> tuple[SearchSpace, list[Case]]:
     """Search space of several specimens' parameters, and the cases at its start.
 
-    Parameters
-    ----------
-    free : parameters to fit, no key twice
-    cases : models of the specimens, no two of one label
-
     Raises
     ------
     InputError

@@ -97,21 +97,17 @@ def estimate(measurements: Sequence[Any]) -> Estimate | None:
     peak = max(float(np.max(np.abs(item.force))) for item in pulls)
     si = isinstance(largest, Loop) and largest.units is not None
     normal = largest.mean_normal_force() if isinstance(largest, Loop) else None
-    if isinstance(largest, Loop) and (levels := inspect(largest).views[0].levels):
-        level = levels[-1]
-        force, displacement = (
-            0.5 * float(np.ptp(column)) for column in (level.loop.force, level.loop.displacement)
-        )
-        told = level.shape.kind in ("micro-slip", "gross slip", "viscous")
-        slides = level.shape.kind == "gross slip"
-        halfway, slope = _halfway(level.loop), _after_turn(level.loop, force / displacement)
-        work = level.work if told else None
-        return Estimate(force, displacement, peak, work, slides, halfway, slope, normal, si)
+    levels = inspect(largest).views[0].levels if isinstance(largest, Loop) else ()
+    pull: Any = levels[-1].loop if levels else largest
     force, displacement = (
-        float(np.max(np.abs(column))) for column in (largest.force, largest.displacement)
+        float(0.5 * np.ptp(column) if levels else np.max(np.abs(column)))
+        for column in (pull.force, pull.displacement)
     )
-    slope = _after_turn(largest, force / displacement)
-    return Estimate(force, displacement, peak, None, False, None, slope, normal, si)
+    kind = levels[-1].shape.kind if levels else ""
+    work = levels[-1].work if kind in ("micro-slip", "gross slip", "viscous") else None
+    halfway, slope = _halfway(pull) if levels else None, _after_turn(pull, force / displacement)
+    slides = kind == "gross slip"
+    return Estimate(force, displacement, peak, work, slides, halfway, slope, normal, si)
 
 
 def _halfway(loop: Loop) -> float:
@@ -250,12 +246,6 @@ def doubt_of_strain(known: Mapping[str, Any], scene: Scene, found: Estimate | No
 
     Numbers without units have no modulus that is too large or too small, but the strain under the
     measured force is a pure number.
-
-    Parameters
-    ----------
-    known : values by dotted key that were given
-    scene : strip at the start
-    found : figures of the loops; None without loops
     """
     stretching = scene.get("strip.axial_stiffness")
     given = any(key in known for key in STIFFNESS) or "strip.length" not in known
@@ -272,13 +262,7 @@ def doubt_of_strain(known: Mapping[str, Any], scene: Scene, found: Estimate | No
 
 
 def check_starts(cases: Sequence[Case], free: Sequence[str]) -> None:
-    """Raise `InputError` if a free number starts a strip so that a measured force slides it off.
-
-    Parameters
-    ----------
-    cases : strips at the start, and what was measured on them
-    free : keys to fit
-    """
+    """Raise `InputError` if a free number starts a strip so that a measured force slides it off."""
     for case in cases:
         scene, found = case.model.own, _peak(case.measurements)
         if not isinstance(scene, Scene):
@@ -309,13 +293,7 @@ def _peak(measurements: Sequence[Any]) -> float:
 
 
 def suits(known: Mapping[str, Any], found: Estimate) -> bool:
-    """True if data without units are such that the standard strip may be meant.
-
-    Parameters
-    ----------
-    known : values by dotted key, which the standard strip takes
-    found : figures of the measurements
-    """
+    """True if data without units are such that the standard strip may be meant."""
     scene, forced = _scene_of(known)
     gross = float(scene.gross_slip)
     most = BELOW if forced else SIMILAR

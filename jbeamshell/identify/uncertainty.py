@@ -202,11 +202,6 @@ def uncertainty_at(problem: Problem, point: Vector) -> Uncertainty:
 
     What the model's own grid may leave in a residual is smooth and alike in all curves, so that all
     together are worth `FEWEST` independent points of it.
-
-    Parameters
-    ----------
-    problem : least-squares problem
-    point : (n,) minimum
     """
     end, emphasis, relative = problem(point), problem.emphasis, problem.relative
     residual, jacobian = end.residual, end.jacobian  # priors are the last rows
@@ -271,10 +266,6 @@ def independent_points(residuals: Sequence[Vector]) -> float:
     All points count where nothing tells the residuals from white noise: neither rho_1 nor
     Bartlett's sum over a few lags (Newey and West, Econometrica 55, 1987; for their number Lazarus
     et al., J. Bus. Econ. Stat. 36, 2018).
-
-    Parameters
-    ----------
-    residuals : residuals along each curve, over their noise
     """
     points = sum(own.size for own in residuals)
     products = np.zeros(max(own.size for own in residuals))

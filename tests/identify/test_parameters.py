@@ -35,10 +35,10 @@ def test_there_and_back(coordinate, value):
     assert coordinate.at(coordinate.of(value))[0] == pytest.approx(value, rel=1e-9)
 
 
-@given(coordinates(), st.floats(-3.0, 3.0))
+@given(coordinates(), st.floats(-2.0, 2.0))
 def test_every_point_lies_within_the_bounds_and_slopes_are_derivatives(coordinate, point):
     assert coordinate.low <= coordinate.at(point)[0] <= coordinate.high
-    assert coordinate.low <= coordinate.at(100.0 * point)[0] <= coordinate.high
+    assert coordinate.low < coordinate.at(100.0 * point)[0] < coordinate.high
     step = 1e-5
     rise = coordinate.at(point + step)[0] - coordinate.at(point - step)[0]
     # Differences lose what they take from numbers of another size.
