@@ -35,6 +35,15 @@ def test_bar_limit_gives_backbone_and_cubic_law(settings, error):
     np.testing.assert_allclose(history.displacement[1 : start + 1], backbone, atol=close)
 
 
+def test_a_bar_loses_as_much_where_little_presses():
+    """Slip stays where a thirtieth of the largest pressure acts, on .8 of 1.1."""
+    pressed = [[0.0, 30.0], [0.9, 30.0], [0.9, 1.0], [2.0, 1.0]]
+    thin = {"strip.height_ratio": 0.001, "contact.pressure": pressed, "load.amplitude": 0.08}
+    history = jb.solve(STEPPED.replace(thin), throw=False)
+    lost = float(bar.cubic_law(0.08, 3.4e4, 0.1))
+    assert float(history.dissipation) == pytest.approx(lost, rel=0.04)
+
+
 SMOOTHED = pytest.param(16.0, 1e-4, marks=pytest.mark.slow)
 
 
