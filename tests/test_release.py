@@ -54,9 +54,9 @@ def test_the_wheel_holds_the_package_its_data_and_their_licence(wheel):
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert package <= names
-    data = {name for name in names if name.startswith("jbeamshell/finite_elements/")}
-    assert "jbeamshell/finite_elements/loops_eta0.1126.csv" in data
-    assert "MIT" in zipfile.ZipFile(wheel).read("jbeamshell/finite_elements/README.md").decode()
+    data = {name for name in names if name.startswith("jbeamshell/example_data/")}
+    assert "jbeamshell/example_data/loops_eta0.1126.csv" in data
+    assert "MIT" in zipfile.ZipFile(wheel).read("jbeamshell/example_data/README.md").decode()
     (about,) = (name for name in names if name.endswith("/METADATA"))
     words = zipfile.ZipFile(wheel).read(about).decode()
     assert "# jbeamshell" in words

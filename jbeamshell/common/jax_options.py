@@ -1,4 +1,4 @@
-"""Options of the whole process that make JAX start and run faster; opt in by `configure`."""
+"""Options of the whole process: precision, speed and start of JAX; opt in by `configure`."""
 
 from __future__ import annotations
 
@@ -22,18 +22,21 @@ WORTH_KEEPING = 0.02  # seconds of compilation, from which on a program is kept 
 
 def configure(
     *,
+    double: bool = True,
     fast_loops: bool = True,
     asynchronous: bool = False,
     cache: str | os.PathLike[str] | bool = True,
     walk: str | None = None,
 ) -> None:
-    """Choose how JAX compiles and calls in this process.
+    """Prepare this process: double precision, compiled programs that are kept, one thread.
 
     LAPACK gets one thread, unless OPENBLAS_NUM_THREADS says otherwise.  Processes that this one
     starts inherit that, ``fast_loops`` and ``walk``, not the other options.
 
     Parameters
     ----------
+    double : True to compute in double precision, as ``jax.config.update("jax_enable_x64", True)``
+        does; False leaves JAX's setting as it is
     fast_loops : True to compile every loop on a CPU to one native function, instead of a call for
         each of its operations.  Loops then run several times faster, load steps above all, and
         compile a little slower.  The option is the compiler's and holds for everything the process
@@ -68,6 +71,8 @@ def configure(
         require_choice("walk", walk, ("c", "jax"))
         _check_not_started(f"walk = {walk!r}")
         os.environ[WALK] = walk
+    if double:
+        jax.config.update("jax_enable_x64", True)
     # Matrices here are small: threads of LAPACK would wait for each other longer than they work.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # SciPy reads it when JAX first needs it
     folder = _default_cache() if cache is True else cache

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import contextvars
+import functools
 import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import jax.monitoring
+
 DELAY = 1.0  # seconds before anything is shown
 TICK = 1.0  # seconds between two signs of life
+WORTH_TELLING = 0.5  # seconds of compilation
+COMPILE = "/jax/core/compile/"  # events of JAX: tracing, lowering, compiling
+_shows: contextvars.ContextVar[bool] = contextvars.ContextVar("_shows", default=False)
 
 
 def in_notebook() -> bool:
@@ -45,7 +52,11 @@ def bar(what: str, unit: str = "step", **options: Any) -> Iterator[Any]:
         options["disable"] = True  # else as the environment says: TQDM_DISABLE=1
     looks = {"desc": what, "unit": unit, "file": sys.stderr, "leave": False, "delay": DELAY}
     with tqdm(**looks, **options) as shown:
-        yield shown
+        token = _shows.set(True)
+        try:
+            yield shown
+        finally:
+            _shows.reset(token)
 
 
 @contextlib.contextmanager
@@ -69,10 +80,14 @@ def counting(
 
 @contextlib.contextmanager
 def patience(what: str) -> Iterator[None]:
-    """Show the seconds that pass, for work that cannot tell how far it is."""
-    if not watched():
+    """Show the seconds that pass, for work that cannot tell how far it is, and what compiles.
+
+    It also serves as a decorator.  Within itself, and within a `bar`, it shows nothing.
+    """
+    if _shows.get() or not watched():
         yield
         return
+    token = _shows.set(True)
     over = threading.Event()
     ticking = threading.Thread(target=_tick, args=(what, over), daemon=True)
     ticking.start()
@@ -81,11 +96,34 @@ def patience(what: str) -> Iterator[None]:
     finally:
         over.set()
         ticking.join()
+        _shows.reset(token)
 
 
 def _tick(what: str, over: threading.Event) -> None:
+    before = _compiling().seconds
     if over.wait(DELAY):
         return
     with bar(what, bar_format="{desc} ... {elapsed}") as shown:
         while not over.wait(TICK):
+            spent = _compiling().seconds - before
+            if spent > WORTH_TELLING:
+                told = f"{spent:.0f} s of it to compile, once for calls of this kind"
+                shown.set_description_str(f"{what}, {told}", refresh=False)
             shown.refresh()
+
+
+class _Compiling:
+    """Seconds for which JAX has traced and compiled in this process since it was made."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        jax.monitoring.register_event_duration_secs_listener(self._add)
+
+    def _add(self, event: str, duration_secs: float, **_: Any) -> None:
+        if event.startswith(COMPILE):
+            self.seconds += duration_secs
+
+
+@functools.cache
+def _compiling() -> _Compiling:
+    return _Compiling()

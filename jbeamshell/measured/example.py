@@ -1,4 +1,4 @@
-"""Example data: finite-element loops that ship with the library."""
+"""Example data that ship with the library: loops of finite elements, and of a bolted joint."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ HEIGHT_RATIOS = (0.0305, 0.0511, 0.1126, 0.2358, 0.4)
 
 
 def data_folder() -> Path:
-    """Folder of the finite-element data, in the installed package or in the source tree."""
-    installed = Path(str(resources.files("jbeamshell"))) / "finite_elements"
+    """Folder of the example data, in the installed package or in the source tree."""
+    installed = Path(str(resources.files("jbeamshell"))) / "example_data"
     source = Path(__file__).resolve().parents[2] / "calibration" / "data"
     for folder in (installed, source):
         if folder.is_dir():
             return folder
-    raise InputError(f"{source}: the finite-element data are missing: reinstall jbeamshell")
+    raise InputError(f"{source}: the example data are missing: reinstall jbeamshell")
 
 
 def example_loops(
@@ -52,3 +52,18 @@ def example_loops(
         if label not in by_label:
             raise InputError(f"amplitudes: there is no {label}; there are {', '.join(by_label)}")
     return [by_label[label] for label in wanted]
+
+
+def bolt_files() -> list[Path]:
+    """Files of the measured loops of a bolted joint, by strokes of .03, .05 and .1 mm.
+
+    Steel plates under an M12 bolt with a preload of 10 kN, moved across the bolt: displacement in
+    mm, transverse force in kN, some three cycles each.
+
+    References
+    ----------
+    Rousseau, R. I. and Bouzid, A.-H. (2025). Effect of clamped member material and thickness on
+    bolt self-loosening under transverse loads. Materials 18, 462, figure 10 (CC BY 4.0).  Digitised
+    by L. R. R. da Silva and N. de Souza da Silva, bolt-analysis-studio (MIT).
+    """
+    return sorted((data_folder() / "bolt_m12").glob("*.csv"))

@@ -16,6 +16,7 @@ from jbeamshell.common.apart import apart
 from jbeamshell.common.checks import check_words, is_traced, require, require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.precision import doubled, in_double, is_single
+from jbeamshell.common.progress import patience
 from jbeamshell.common.small import Small
 from jbeamshell.common.threads import on_one_core
 from jbeamshell.contact_line.shared import Layout, Shared, shared
@@ -118,6 +119,7 @@ class Answers:
 
     def __init__(self, scene: Scene, asked: _Asked) -> None:
         self._given = scene, asked
+        self._asked = False
         self._ask = _response(scene, asked)
         if not is_traced(scene) and is_single(scene):
             with jax.enable_x64(True):
@@ -125,7 +127,12 @@ class Answers:
             self._ask = in_double(precise, within=self._ask)
 
     def __call__(self, *values: Array) -> dict[str, Array]:
-        return self._ask(*values)
+        if self._asked:
+            return self._ask(*values)
+        with patience("answering for the first time"):
+            found = self._ask(*values)
+        self._asked = True
+        return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), self._given

@@ -38,8 +38,11 @@ def test_flags_are_added_to_what_is_there():
 
 
 def test_nothing_is_chosen_by_import():
-    assert flags_after({}, "pass") == ""
-    assert flags_after({}, "jbeamshell.configure(fast_loops=False)") == ""
+    look = "import jax; print(jax.config.jax_enable_x64)"
+    assert flags_after({}, look) == "False"
+    single = "jbeamshell.configure(double=False, fast_loops=False)"
+    assert flags_after({}, f"{single}; {look}") == "False"
+    assert flags_after({}, f"jbeamshell.configure(fast_loops=False); {look}") == "True"
 
 
 def test_the_walk_is_in_jax_where_it_is_asked_for_and_says_the_same():

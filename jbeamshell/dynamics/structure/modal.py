@@ -32,6 +32,7 @@ from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
+from jbeamshell.common.progress import patience
 from jbeamshell.dynamics.frequencies import OverAmplitude
 from jbeamshell.dynamics.structure.elements import Elements, elements_of
 from jbeamshell.dynamics.structure.matrices import Structure
@@ -82,6 +83,7 @@ class ModalCurve(OverAmplitude):
         )
 
 
+@patience("following the mode")
 def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
     """Frequency and damping of a mode over its amplitude, by quasi-static modal analysis.
 

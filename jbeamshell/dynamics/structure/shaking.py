@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import POSITIVE, require, require_count, require_number
 from jbeamshell.common.errors import InputError, warn_of_doubts
 from jbeamshell.common.precision import doubled
+from jbeamshell.common.progress import patience
 from jbeamshell.common.summary import Summary, with_unit
 from jbeamshell.dynamics.ledger import InterruptedMotionError, Ledger
 from jbeamshell.dynamics.structure.elements import Elements, elements_of
@@ -118,6 +119,7 @@ class _Model(NamedTuple):
     elements: Elements
 
 
+@patience("shaking")
 def shake(
     structure: Structure,
     span: float,

@@ -14,6 +14,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.progress import patience
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration import setup
 from jbeamshell.dynamics.vibration.balance import (
@@ -34,6 +35,7 @@ SLIGHT = 1e-3  # part of a force at which a structure is nearly elastic
 NOT_FOUND = "no steady response is found at the frequency {:.6g}"
 
 
+@patience("following the response")
 def forced_response(
     structure: Structure,
     force: ArrayLike,

@@ -12,6 +12,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require_count
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
+from jbeamshell.common.progress import patience
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration import setup
 from jbeamshell.dynamics.vibration.balance import Point, Rows, marched, polished
@@ -21,6 +22,7 @@ from jbeamshell.dynamics.vibration.results import NonlinearMode
 SLIGHT = 1e-3  # part of the first amplitude, at which a mode is nearly linear
 
 
+@patience("following the mode")
 def nonlinear_mode(
     structure: Structure,
     amplitudes: ArrayLike,
