@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from jbeamshell.cli.arguments import add_scene, add_settings, scene_of
-from jbeamshell.cli.dimensions import add_dimensions
+from jbeamshell.cli.dimensions import add_dimensions, specimen_of
 from jbeamshell.cli.terminal import put, say
 
 MOST = 65535  # largest number of a port
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     check_installed()
     from jbeamshell.explorer.serve import serve
 
-    given = options.scene is not None or options.set
+    given = options.scene is not None or options.set or specimen_of(options).totals
     scene = scene_of(options) if given else None
     loops = read_loops(options.data) if options.data else []
     say("compiling ...")

@@ -21,7 +21,7 @@ class Dimension(NamedTuple):
 DIMENSIONS = {
     "length": Dimension("m", "120mm", "length of the contact, from its support to the loaded end"),
     "thickness": Dimension("m", "12mm", "thickness of the strip, 2H"),
-    "width": Dimension("m", "50mm", "width of the specimen, whose forces are totals"),
+    "width": Dimension("m", "50mm", "width of the specimen, which bears the whole force"),
     "modulus": Dimension("Pa", "210GPa", "Young's modulus of the strip"),
     "poisson": Dimension("", "0.3", "Poisson's ratio of the strip"),
     "pressure": Dimension("Pa", "5MPa", "even pressure on the strip, if there are no bolts"),
