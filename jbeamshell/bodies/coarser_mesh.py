@@ -23,7 +23,7 @@ Vector = NDArray[np.float64]
 
 
 def coarser(problem: Problem) -> tuple[Vector, ...] | None:
-    """For each body, displacements (3n, 3k) of its nodes from those that stay.
+    """For each body, displacements (3n, 3n) of its nodes from those that stay, else zero.
 
     None where a mesh has too few nodes, or is too round to be drawn in a plane.
     """
@@ -43,7 +43,7 @@ def coarser(problem: Problem) -> tuple[Vector, ...] | None:
 
 
 def _interpolation(body: Substructure) -> Vector | None:
-    """Displacements (3n, 3k) of the nodes from those of the k that stay, in their frames."""
+    """Displacements (3n, 3n) of the nodes from those that stay, in their frames."""
     places, normals = np.asarray(body.places), np.asarray(body.normals)
     mean = np.mean(normals, axis=0)
     length = float(np.linalg.norm(mean))
@@ -55,10 +55,10 @@ def _interpolation(body: Substructure) -> Vector | None:
         triangles = Delaunay(flat[kept])
     except QhullError:  # all on a line
         return None
-    shares = _linear(triangles, flat)
-    frames = body.frames
-    turned = np.einsum("nix,kjx->nikj", frames, frames[kept])
-    return (shares[:, None, :, None] * turned).reshape(3 * len(places), 3 * len(kept))
+    shares, frames = np.zeros((len(places), len(places))), body.frames
+    shares[:, kept] = _linear(triangles, flat)
+    turned = np.einsum("nix,kjx->nikj", frames, frames)
+    return (shares[:, None, :, None] * turned).reshape(3 * len(places), 3 * len(places))
 
 
 def _kept(flat: Vector) -> NDArray[np.int64]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import functools
+from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +19,7 @@ from jbeamshell.bodies.face_step import Face
 from jbeamshell.bodies.joined import grounded, potential_of
 from jbeamshell.bodies.substructure import Substructure, frames_of
 from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.small import Small
 from jbeamshell.contact_line.pair import together
 
 
@@ -37,9 +38,7 @@ class Bodies(NamedTuple):
     held: Array
 
 
-def bodies_of(
-    problem: Problem, coarse: tuple[NDArray[np.float64], ...] | None = None
-) -> Bodies:
+def bodies_of(problem: Problem, coarse: tuple[NDArray[np.float64], ...] | None = None) -> Bodies:
     """Bodies of a problem, joined.
 
     Parameters
@@ -55,11 +54,12 @@ def bodies_of(
         if not is_traced(upper, lower):
             lower = grounded(upper, lower)
     bodies = [body for body in (upper, lower) if body is not None]
-    sides = [_side(made, body, below) for body, below in zip(bodies, (False, True), strict=False)]
-    given = bodies, sides, coarse or (None, None)
+    sides = [side_of(made, body, below) for body, below in zip(bodies, (False, True), strict=False)]
+    free = [np.eye(3 * body.places.shape[0]) for body in bodies]
+    given = bodies, sides, free if coarse is None else list(coarse)
     count = max(body.forces.shape[1] for body in bodies)
     numbers = problem.friction, problem.gap, problem.roughness, problem.softness
-    found = _assembled(given, numbers, count, made.pairs)
+    found = _assembled((given, numbers), count, made.pairs, _group(made))
     if problem.control == "displacement":
         soft = found.face.flexibility[0, 0]
         fix = "the pulled nodes are in the contact: take control='force'"
@@ -67,15 +67,63 @@ def bodies_of(
     return found
 
 
-@eqx.filter_jit
+class Stiffer(NamedTuple):
+    """What springs of contact points add to the bodies that they lie between.
+
+    Attributes
+    ----------
+    bodies : for each body, (3n, 3n) stiffness on the nodes of its face, by which it is stiffer
+    shares : for each body, (q, k, 3, 3) and the nodes (q, k) of its points
+    springs : (q, 3) stiffness of the points
+    """
+
+    bodies: list[NDArray[np.float64]]
+    shares: list[tuple[NDArray[np.int64], NDArray[np.float64]]]
+    springs: NDArray[np.float64]
+
+
+def stiffer(upper: Substructure, lower: Substructure | None, made: ContactPoints) -> Stiffer:
+    """Springs of contact points between two bodies, and the bodies without what they give way by."""
+    bodies = [body for body in (upper, lower) if body is not None]
+    count = max(body.forces.shape[1] for body in bodies)
+    sides, more, soft = [], [], 0.0
+    for body, shares in zip(bodies, (made.upper, made.lower), strict=False):
+        assert shares is not None
+        side = side_of(made._replace(upper=shares, pairs=True), body, False)
+        size = 3 * body.places.shape[0]
+        part = _sprung((body, side, np.eye(size)), count)
+        added = np.asarray(part.hessian[:size, :size]) - np.asarray(body.stiffness)
+        held = np.array(body.fixed)
+        more.append(np.where(held | held[:, None], 0.0, added))
+        sides.append((np.asarray(side.nodes), np.asarray(side.shares)))
+        soft = soft + np.asarray(part.softness)
+    return Stiffer(more, sides, 1.0 / np.asarray(soft)[:, [0, 0, 1]])
+
+
+@functools.partial(Small, level=0)
+def _sprung(inputs: tuple[Substructure, Side, Array], count: int) -> Sprung:
+    body, side, free = inputs
+    return sprung(potential_of(body, count), side, np.array(body.fixed), free)
+
+
+def _group(made: ContactPoints) -> int:
+    """Number of points that share their nodes, one after the other, the same all over the face."""
+    sides = [made.upper] if made.lower is None else [made.upper, made.lower]
+    rows = np.concatenate([side.nodes for side in sides], axis=1)
+    begins = np.flatnonzero(np.append(True, np.any(np.diff(rows, axis=0) != 0, axis=1)))
+    sizes = np.diff(np.append(begins, len(rows)))
+    return int(np.gcd.reduce(sizes))
+
+
+@functools.partial(Small, level=0)
 def _assembled(
-    given: tuple[list[Substructure], list[Side], tuple[Array | None, ...]],
-    numbers: tuple[Array, ...],
+    inputs: tuple[tuple[list[Substructure], list[Side], list[Any]], tuple[Array, ...]],
     count: int,
     pairs: bool,
+    group: int,
 ) -> Bodies:
     """Bodies and the law of their points."""
-    bodies, sides, coarse = given
+    (bodies, sides, coarse), numbers = inputs
     friction, gap, roughness, softness = numbers
     fixed = [np.array(body.fixed) for body in bodies]
     parts = [
@@ -97,6 +145,7 @@ def _assembled(
         roughness=roughness,
         springs=1.0 / (soft + softness),
     )
+    nodes = nodes.reshape(-1, group, nodes.shape[1])[:, 0]
     face = Face(stiffness, loads, -hessian[size:, size:], nodes, shares, points)
     return Bodies(face, soft[:, 1], stays)
 
@@ -122,7 +171,7 @@ def _joined(
     return hessian, nodes, shares, np.concatenate(fixed)
 
 
-def _side(made: ContactPoints, body: Substructure, below: bool) -> Side:
+def side_of(made: ContactPoints, body: Substructure, below: bool) -> Side:
     """Nodes of the points on one body."""
     shares = made.lower if below and not made.pairs else made.upper
     assert shares is not None

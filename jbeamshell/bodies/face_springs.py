@@ -23,7 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from jbeamshell.numerics.factors import inverse_cholesky
+from jbeamshell.numerics.factors import inverse_cholesky, solve
 
 PART = 0.5  # of the flexibility of the nodes' shortest wave, that lies in the springs
 WAVES = 40  # iterations for the shortest wave; `PART` leaves room for what they miss
@@ -60,7 +60,7 @@ class Sprung(NamedTuple):
 
 
 def sprung(
-    hessian: Array, side: Side, fixed: np.ndarray, coarse: Array | None = None
+    hessian: Array, side: Side, fixed: np.ndarray, coarse: Array
 ) -> Sprung:
     """Body on springs.
 
@@ -69,8 +69,8 @@ def sprung(
     hessian : (3n + m, 3n + m) second derivatives of the body's potential, in nodes and loads
     side : its contact points
     fixed : (3n,) True for displacements that a support holds
-    coarse : (3n, k) displacements of the nodes from those of a coarser mesh, which the body is
-        then held to
+    coarse : (3n, 3n) displacements of the nodes from those that stay in a coarser mesh, to which
+        the body is held, its other columns zero; of a body that is free, the unit matrix
     """
     size, crossed = fixed.size, fixed | fixed[:, None]
     k = jnp.where(crossed, 0.0, hessian[:size, :size])
@@ -84,11 +84,10 @@ def sprung(
     h = jnp.zeros((size, size)).at[rows, columns].add(each)
     alone = np.diag(fixed.astype(float)) * jnp.max(h)
     h = jnp.where(crossed, 0.0, h) + alone
-    whole = coarse is None
-    if coarse is not None:
-        empty = jnp.all(coarse == 0.0, axis=0)
-        k, f = coarse.T @ k @ coarse, coarse.T @ f
-        h = coarse.T @ h @ coarse + jnp.diag(empty * jnp.max(h))
+    lost = jnp.diag(jnp.all(coarse == 0.0, axis=0).astype(float))
+    k, f = coarse.T @ k @ coarse, coarse.T @ f
+    h = coarse.T @ h @ coarse
+    h += lost * jnp.max(h)
     longest = _shortest_wave(k, h)
     h = h * longest / PART
     inverse = inverse_cholesky(h - k)
@@ -96,11 +95,10 @@ def sprung(
     on_k, on_f = both[:, : len(k)], both[:, len(k) :]
     k, f = k + on_k.T @ on_k, f + on_k.T @ on_f
     c = -hessian[size:, size:] - on_f.T @ on_f
-    if not whole:
-        onto = jnp.linalg.pinv(coarse)
-        rest = np.eye(size) - coarse @ onto
-        k = onto.T @ k @ onto + HELD * jnp.max(k) * rest.T @ rest
-        f = onto.T @ f
+    onto = solve(coarse.T @ coarse + lost, coarse.T)
+    rest = np.eye(size) - coarse @ onto
+    k = onto.T @ k @ onto + HELD * jnp.max(k) * rest.T @ rest
+    f = onto.T @ f
     found = jnp.block([[k, -f], [-f.T, -c]])
     return Sprung(found, per_area * PART / longest / side.areas[:, None])
 

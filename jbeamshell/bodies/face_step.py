@@ -37,8 +37,9 @@ class Face(NamedTuple):
     stiffness : (N, N) K of the nodes' displacements, three of each node in turn
     loads : (N, m) f of the load to and fro and of the bolts
     flexibility : (m, m) c, displacements per load while the nodes stay
-    nodes : (q, k) nodes of each contact point
-    shares : (q, k, 3, 3) their part B in its displacement, two tangential and the normal one
+    nodes : (g, k) nodes of each group of contact points, such as those of an element
+    shares : (q, k, 3, 3) their part B in the displacement of each point, the points of a group after
+        each other; two tangential displacements and the normal one
     points : numbers of the contact points
     """
 
@@ -51,12 +52,19 @@ class Face(NamedTuple):
 
     def moves(self, u: Array) -> Array:
         """Displacements (q, 3) of the points, from those of the nodes (N,)."""
-        return jnp.einsum("qkij,qkj->qi", self.shares, u.reshape(-1, 3)[self.nodes])
+        near = u.reshape(-1, 3)[self.nodes]
+        return jnp.einsum("gpkij,gkj->gpi", self._grouped, near).reshape(-1, 3)
 
     def on_nodes(self, force: Array) -> Array:
         """Nodal forces (N,) of the points' forces (q, 3)."""
-        each = jnp.einsum("qkij,qi->qkj", self.shares, force)
+        shares = self._grouped
+        each = jnp.einsum("gpkij,gpi->gkj", shares, force.reshape(*shares.shape[:2], 3))
         return jnp.zeros((self.loads.shape[0] // 3, 3)).at[self.nodes].add(each).ravel()
+
+    @property
+    def _grouped(self) -> Array:
+        """Shares (g, points, k, 3, 3)."""
+        return self.shares.reshape(self.nodes.shape[0], -1, *self.shares.shape[1:])
 
     def forces(self, u: Array, slip: Array) -> Array:
         """Forces (q, 3) of the contact."""
@@ -64,7 +72,9 @@ class Face(NamedTuple):
 
     def blocks(self, stiffness: Array) -> tuple[tuple[Array, Array], Array]:
         """Rows and columns, and entries, of B' S B for stiffnesses (q, 3, 3) of the points."""
-        each = jnp.einsum("qkia,qij,qljb->qkalb", self.shares, stiffness, self.shares)
+        shares = self._grouped
+        pushed = jnp.einsum("gpij,gpljb->gpilb", stiffness.reshape(*shares.shape[:2], 3, 3), shares)
+        each = jnp.einsum("gpkia,gpilb->gkalb", shares, pushed)
         places = 3 * self.nodes[:, :, None] + np.arange(3)
         rows = jnp.broadcast_to(places[:, :, :, None, None], each.shape)
         return (rows, jnp.broadcast_to(places[:, None, None], each.shape)), each
@@ -200,6 +210,7 @@ def _newton_step(
     if not counts:
         return on_all()
     slides = jnp.any(springs + slopes != 0.0, axis=(1, 2))
+    slides = jnp.any(slides.reshape(face.nodes.shape[0], -1), axis=1)
     near = jnp.zeros(size // 3, bool).at[face.nodes].max(slides[:, None])
     order = jnp.argsort(jnp.repeat(~near, 3), stable=True)
     branch = jnp.searchsorted(np.array(counts), 3 * jnp.sum(near))

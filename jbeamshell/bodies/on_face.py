@@ -22,6 +22,7 @@ STEPS = 32  # per half cycle
 MOST_CYCLES = 16  # until the loop is steady
 PRESSING = 8  # steps in which the bolts are tightened with friction
 REPEATS = 3e-3  # slip left over by a steady cycle, over its largest range: .2 % of D
+LARGE = 150  # contact points, from which on the time of a run counts
 SLIDES = 1e-9  # of friction times reaction, within which a point is at its limit
 TOUCHES = 1e-9  # of the largest reaction, below which one is that of an open point, rounded
 
@@ -55,7 +56,7 @@ def solved(problem: Problem) -> Found:
     """
     bodies, loads = bodies_of(problem), problem.loads
     settings = problem.assembly == "frictional", problem.half, problem.control == "displacement"
-    steps, count = _walk((bodies.face, loads, jnp.asarray(MOST_CYCLES)), *settings)
+    steps, count = _walk((bodies.face, loads, np.asarray(MOST_CYCLES)), *settings)
     levels = _in_levels((bodies, steps))
     if problem.unit is None or is_traced(levels) or not bool(jnp.all(levels.sound)):
         return Found(levels, count)
@@ -66,14 +67,13 @@ def solved(problem: Problem) -> Found:
         meshes.append(bodies_of(problem, onto))
     found = []
     for each in meshes:
-        fewer, _ = _walk((each.face, rests, count), *settings)
+        fewer, _ = _walk((each.face, rests, np.asarray(count)), *settings)
         every_second = jax.tree.map(lambda a: np.asarray(a)[::2], fewer)
         found.append(_in_levels((each, every_second)))
     return Found(levels, count, *found)
 
 
-@functools.partial(Small, level=0)
-def _walk(
+def _levels_of(
     inputs: tuple[Face, Array, Array], frictional: bool, half: int | None, driven: bool
 ) -> tuple[Steps, Array]:
     """Levels of the path, and the number of cycles until it is steady, see `_until_steady`.
@@ -88,38 +88,56 @@ def _walk(
     driven : True if the load to and fro is a displacement since the pressing, in which it is free
     """
     face, loads, most = inputs
-    sticking = Sticking.of(lax.stop_gradient(face))
+    bodies = face, Sticking.of(lax.stop_gradient(face))
     parts = np.arange(1, PRESSING + 1) / PRESSING if frictional else np.ones(1)
     last = parts.size - 1
     cycles = 0 if half is None else 2 * half * MOST_CYCLES
     rise = loads.shape[0] - cycles
     ways = jnp.concatenate([jnp.asarray(parts)[:, None] * loads[0], loads[1:rise]])
-    # One loop for the pressing and for what comes then: each step compiles for seconds.
-    rubs = np.append(np.full(parts.size, float(frictional)), np.ones(rise - 1))
-    path = np.arange(rubs.size) >= parts.size
+    # Each loop compiles for seconds: that of the pressing and the rise takes the cycles too.
+    length = ways.shape[0] if half is None else 2 * half
+    ways = jnp.concatenate([ways, jnp.broadcast_to(ways[-1], (length - len(ways), ways.shape[1]))])
+    number = np.arange(length)
+    path = number > last
+    rubs = np.where(path, 1.0, float(frictional))
+    first = ways, rubs, path & driven, number == parts.size
     nothing = Steps(
         given=jnp.zeros_like(loads[0]),
         load=jnp.zeros_like(loads[0]),
         u=jnp.zeros(face.loads.shape[0]),
-        slip=jnp.zeros((face.nodes.shape[0], 2)),
-        force=jnp.zeros((face.nodes.shape[0], 3)),
+        slip=jnp.zeros((face.shares.shape[0], 2)),
+        force=jnp.zeros((face.shares.shape[0], 3)),
         error=jnp.zeros(()),
         iterations=jnp.zeros(()),
     )
-    bodies = face, sticking
-    first = _steps(bodies, nothing, None, (ways, rubs, path & driven, np.diff(path, prepend=0) > 0))
-    pressed = jax.tree.map(lambda a: a[last : last + 1], first)._replace(
-        error=jnp.max(first.error[: last + 1], keepdims=True),
-        iterations=jnp.sum(first.iterations[: last + 1], keepdims=True),
-    )
-    levels = jax.tree.map(lambda a, b: jnp.concatenate([a, b[last + 1 :]]), pressed, first)
+    begin, count = (nothing, jnp.zeros(())), jnp.asarray(0)
     if half is None:
-        return levels, jnp.asarray(0)
-    cycle = loads[rise : rise + 2 * half]
-    start = _displacement(face, first.u[last], first.load[last])
-    begin = jax.tree.map(lambda a: a[-1], first)
-    rest, count = _until_steady(bodies, begin, start, (cycle, most), driven)
-    return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), levels, rest), count
+        begun, _ = _steps(bodies, *begin, first)
+    else:
+        cycle = loads[rise : rise + length]
+        none = np.zeros(length, bool)
+        others = cycle, none + 1.0, none | driven, none
+        begun, rest, count = _until_steady(bodies, begin, (first, others), most)
+    pressed = jax.tree.map(lambda a: a[last : last + 1], begun)._replace(
+        error=jnp.max(begun.error[: last + 1], keepdims=True),
+        iterations=jnp.sum(begun.iterations[: last + 1], keepdims=True),
+    )
+    stop = last + rise  # what comes then are rests
+    parted = [pressed, jax.tree.map(lambda a: a[last + 1 : stop], begun)]
+    parted += [] if half is None else [rest]
+    return jax.tree.map(lambda *a: jnp.concatenate(a), *parted), count
+
+
+WALKS = Small(_levels_of, level=0), Small(_levels_of)
+
+
+def _walk(inputs: tuple[Face, Array, Array], *settings: Any) -> tuple[Steps, Array]:
+    """Levels of the path and the number of cycles, by the program that suits the face.
+
+    That of a large face takes longer to compile, and less to run.
+    """
+    found: tuple[Steps, Array] = WALKS[inputs[0].shares.shape[0] >= LARGE](inputs, *settings)
+    return found
 
 
 def _displacement(face: Face, u: Array, load: Array) -> Array:
@@ -127,72 +145,71 @@ def _displacement(face: Face, u: Array, load: Array) -> Array:
     return face.loads[:, 0] @ u + face.flexibility[0] @ load
 
 
+Path = tuple[Any, Any, Any, Any]
+
+
 def _until_steady(
     bodies: tuple[Face, Sticking],
-    begin: Steps,
-    start: Array,
-    path: tuple[Array, Array],
-    driven: bool,
-) -> tuple[Steps, Array]:
-    """Levels of all cycles, and the number of those that were taken.
+    begin: tuple[Steps, Array],
+    paths: tuple[Path, Path],
+    most: Array,
+) -> tuple[Steps, Steps, Array]:
+    """Levels up to the first cycle, levels of all cycles, and the number of those that were taken.
 
     Parameters
     ----------
-    begin : level after the first loading
-    start : displacement of the load after the pressing
-    path : (levels, m) loads of a cycle, and most cycles
-    driven : see `_walk`
+    begin : level before the pressing, and displacement of the load
+    paths : up to the first cycle, and of each cycle, see `_steps`
+    most : cycles at most
     """
-    cycle, most = path
-    none = np.zeros(cycle.shape[0])
+    length = paths[0][1].size
+    first, cycle = (tuple(map(jnp.asarray, path)) for path in paths)
 
     def go(
-        carry: tuple[Steps, Array], number: Array
-    ) -> tuple[tuple[Steps, Array], tuple[Steps, Array]]:
-        before, steady = carry
+        carry: tuple[Steps, Array, Array], number: Array
+    ) -> tuple[tuple[Steps, Array, Array], tuple[Steps, Array]]:
+        before, start, steady = carry
 
-        def taken() -> Steps:
-            last = jax.tree.map(lambda a: a[-1], before)
-            flags = none + 1.0, none + float(driven) > 0.0, none > 0.0
-            return _steps(bodies, last, start, (cycle, *flags))
+        def taken() -> tuple[Steps, Array]:
+            path = jax.tree.map(lambda a, b: jnp.where(number == 0, a, b), first, cycle)
+            return _steps(bodies, jax.tree.map(lambda a: a[-1], before), start, path)
 
-        now = lax.cond(steady, lambda: before, taken)
+        now, start = lax.cond(steady, lambda: (before, start), taken)
         ends = lax.stop_gradient(now.slip)
         apart = jnp.max(jnp.abs(ends[-1] - lax.stop_gradient(before.slip[-1])))
-        repeats = apart <= REPEATS * jnp.max(jnp.ptp(ends, axis=0))
+        repeats = (apart <= REPEATS * jnp.max(jnp.ptp(ends, axis=0))) & (number > 0)
         lost = ~(now.error[-1] <= TOLERANCE)
-        ends_here = repeats | lost | (number + 1 >= most)
-        return (now, steady | ends_here), (now, steady)
+        ends_here = repeats | lost | (number >= most)
+        return (now, start, steady | ends_here), (now, steady)
 
-    rests = jax.tree.map(lambda a: jnp.broadcast_to(a, (cycle.shape[0], *a.shape)), begin)
-    _, (cycles, copied) = lax.scan(go, (rests, jnp.asarray(False)), jnp.arange(MOST_CYCLES))
-    count = jnp.sum(~copied)
+    still = jax.tree.map(lambda a: jnp.broadcast_to(a, (length, *a.shape)), begin[0])
+    carry = still, begin[1], jnp.asarray(False)
+    _, (blocks, copied) = lax.scan(go, carry, jnp.arange(1 + MOST_CYCLES))
+    count = jnp.sum(~copied) - 1
     # Those that were taken come last: the last cycle of a traced path is that of a plain one.
-    number = jnp.arange(MOST_CYCLES) - (MOST_CYCLES - count)
-    here = number >= 0
+    number = 1 + jnp.arange(MOST_CYCLES) - (MOST_CYCLES - count)
+    rests = (number < 1).reshape(-1, 1)
 
-    def in_order(all_cycles: Array, rest: Array) -> Array:
-        wanted = here.reshape(-1, *[1] * (all_cycles.ndim - 1))
-        chosen = jnp.where(wanted, all_cycles[jnp.maximum(number, 0)], rest)
-        return chosen.reshape(-1, *all_cycles.shape[2:])
+    def in_order(levels: Array) -> Array:
+        chosen = levels[jnp.maximum(number, 0)]
+        resting = rests.reshape(-1, *[1] * (levels.ndim - 1))
+        chosen = jnp.where(resting, levels[0, -1], chosen)
+        return chosen.reshape(-1, *levels.shape[2:])
 
-    return jax.tree.map(in_order, cycles, rests), count
+    return jax.tree.map(lambda a: a[0], blocks), jax.tree.map(in_order, blocks), count
 
 
 def _steps(
-    bodies: tuple[Face, Sticking],
-    begin: Steps,
-    start: Array | None,
-    path: tuple[Array, np.ndarray, np.ndarray, np.ndarray],
-) -> Steps:
-    """Levels of a path.
+    bodies: tuple[Face, Sticking], begin: Steps, start: Array, path: Path
+) -> tuple[Steps, Array]:
+    """Levels of a path, and the displacement of the load after the pressing.
 
     The search for a level starts where the last step would lead if it went on.
 
     Parameters
     ----------
     begin : level before it
-    start : displacement of the load after the pressing; None until it is known
+    start : displacement of the load after the pressing, 0 until it is known
     path : loads (steps, m), part (steps,) of the friction that acts, True where the displacement of
         the load is prescribed, and True where the pressing has ended
     """
@@ -218,8 +235,9 @@ def _steps(
         return (level, moved, jnp.where(rests, further, ahead), start), level
 
     still = jnp.zeros_like(begin.u), jnp.zeros_like(begin.given)
-    start = jnp.zeros(()) if start is None else start
-    return lax.scan(step, (begin, *still, start), tuple(map(jnp.asarray, path)))[1]
+    whole = tuple(map(jnp.asarray, path))
+    (_, _, _, start), levels = lax.scan(step, (begin, *still, start), whole)
+    return levels, start
 
 
 @functools.partial(Small, level=0)
