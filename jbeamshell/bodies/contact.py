@@ -133,8 +133,8 @@ def solve_contact(
     else:
         fix = "is given beside path: leave one of them out"
         require("cycles", cycles, cycles is None, fix)
-    sizes = checked_bolts(upper, lower, bolts)
     made = contact_points(upper, lower, points) if face else None
+    sizes = checked_bolts(upper, lower, bolts)
     smooth = jnp.zeros(())
     problem = Problem(
         upper=upper,
@@ -166,11 +166,19 @@ def solve_contact(
             for each in others
             if each is not None
         ]
-        history = history.compared_with(*fewer)
+        history = history.compared_with(*fewer, kind=_kind(problem))
     if throw and not is_traced(history):
         _demand(problem, levels)
         warn_of_doubts(history.doubts, stacklevel=2)
     return history
+
+
+def _kind(problem: Problem) -> str:
+    """Kind of a face's mesh, see `jbeamshell.history.contact_history.MeshChange`."""
+    bodies = [body for body in (problem.upper, problem.lower) if body is not None]
+    if any(len(row) > 4 for body in bodies for row in body.elements):
+        return "quadratic"
+    return "linear" if problem.face is None or problem.face.pairs else "cut"
 
 
 def _taken(levels: Levels, size: int, steps: int, face: bool) -> Levels:
@@ -179,7 +187,9 @@ def _taken(levels: Levels, size: int, steps: int, face: bool) -> Levels:
     Those of a line come first, those of a face last.
     """
     rise = 1 + steps // 2 if face else 1 + size
-    return jax.tree.map(lambda a: np.concatenate([a[:rise], a[len(a) - (1 + size - rise) :]]), levels)
+    return jax.tree.map(
+        lambda a: np.concatenate([a[:rise], a[len(a) - (1 + size - rise) :]]), levels
+    )
 
 
 def _cycles(problem: Problem, unit: np.ndarray | None) -> tuple[tuple[int, int, int], ...]:

@@ -45,6 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.bodies.deck import Deck
+from jbeamshell.bodies.deck_check import check_deck
 from jbeamshell.bodies.modes import FacePart
 from jbeamshell.bodies.stiffness_model import StiffnessModel
 from jbeamshell.bodies.substructure import Substructure
@@ -185,6 +186,8 @@ def _part(key: str, table: Any, here: Path) -> FacePart:
     require(f"{key}.face", None, "face" in table, "name a surface of the deck, or give its nodes")
     deck = _deck(key, table, here)
     model = _model(key, table, here)
+    if deck is not None:
+        check_deck(key, deck, model)
     options: dict[str, Any] = {}
     if deck is None:
         nodes = _table_from(f"{key}.face", table["face"], here)

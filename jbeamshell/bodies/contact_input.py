@@ -125,9 +125,7 @@ def checked_gap(upper: Substructure, face: ContactPoints | None, gap: ArrayLike)
     return distance if face is None else face.upper.of(distance)
 
 
-def checked_friction(
-    upper: Substructure, face: ContactPoints | None, friction: ArrayLike
-) -> Array:
+def checked_friction(upper: Substructure, face: ContactPoints | None, friction: ArrayLike) -> Array:
     """Coulomb's coefficient, () or, on a face, (q,)."""
     value, n = as_leaf(friction, "friction"), upper.places.shape[0]
     shapes = ((), (n,)) if upper.on_face else ((),)

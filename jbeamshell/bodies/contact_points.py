@@ -1,8 +1,8 @@
 """Contact points of two faces: pairs of nodes, or quadrature points of the elements.
 
-The elements of one face are cut by those of the other, each piece in the plane of the upper element,
-so that the points integrate the shape functions of both sides: an even pressure passes from mesh to
-mesh (Puso and Laursen 2004).  Where the meshes match, the points are those of Gauss.
+The elements of one face are cut by those of the other, each piece in the plane of the upper
+element, so that the points integrate the shape functions of both sides: an even pressure passes
+from mesh to mesh (Puso and Laursen 2004).  Where the meshes match, the points are those of Gauss.
 """
 
 from __future__ import annotations
@@ -133,7 +133,9 @@ def _on_elements(body: Substructure) -> ContactPoints:
     return _points(body, parts, None, True)
 
 
-def _points(body: Substructure, parts: list[Any], lower: Shares | None, pairs: bool) -> ContactPoints:
+def _points(
+    body: Substructure, parts: list[Any], lower: Shares | None, pairs: bool
+) -> ContactPoints:
     """Points of parts (element, places, areas, nodes, values)."""
     elements = np.concatenate([np.full(len(part[1]), part[0]) for part in parts])
     places, areas, nodes, values = (
@@ -287,7 +289,8 @@ def _clipped(outline: Vector, other: Vector) -> Vector:
 def _rule(piece: Vector, quadratic: bool) -> tuple[Vector, Vector]:
     """Points (k, 2) of a flat polygon's quadrature, and their areas (k,)."""
     first, second, third = piece[0], piece[1:-1], piece[2:]
-    doubled = np.cross(second - first, third - first)
+    (ux, uy), (vx, vy) = (second - first).T, (third - first).T
+    doubled = ux * vy - uy * vx
     if quadratic:
         (u, v), weights = SIX.points.T, SIX.weights
         places = first + u[:, None, None] * (second - first) + v[:, None, None] * (third - first)

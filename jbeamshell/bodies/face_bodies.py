@@ -83,7 +83,7 @@ class Stiffer(NamedTuple):
 
 
 def stiffer(upper: Substructure, lower: Substructure | None, made: ContactPoints) -> Stiffer:
-    """Springs of contact points between two bodies, and the bodies without what they give way by."""
+    """Springs of contact points between bodies, and these without what the springs give way by."""
     bodies = [body for body in (upper, lower) if body is not None]
     count = max(body.forces.shape[1] for body in bodies)
     sides, more, soft = [], [], 0.0

@@ -74,9 +74,7 @@ def _triangle(orbits: list[tuple[float, float]]) -> Rule:
 
 # Exact for polynomials of the degrees 2 and 4 on a triangle (Dunavant 1985), 3 and 5 on a square.
 THREE = _triangle([(1.0 / 6.0, 1.0 / 3.0)])
-SIX = _triangle(
-    [(0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)]
-)
+SIX = _triangle([(0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)])
 RULES = {3: THREE, 4: _square(2), 6: SIX, 8: _square(3), 9: _square(3)}
 
 

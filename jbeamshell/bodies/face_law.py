@@ -1,15 +1,16 @@
 """Law of one contact point: unilateral contact and Coulomb friction in two directions, on springs.
 
 With v = (v_1, v_2, v_n) the displacement of the upper body over the lower one, lambda the force
-that the contact puts on the upper body, s the slip so far, and k_t and k_n the springs of the point,
+that the contact puts on the upper body, s the slip so far, and k_t and k_n the springs of the
+point,
 
     lambda_n / k_n + h log(1 + lambda_n / F_0) = max(0, -(gap + v_n)),
     lambda_t = projection of -k_t (v_t - s) on the disc of radius mu lambda_n,
 
 the logarithm for rough surfaces, whose heights are exponential (Greenwood and Williamson 1966).
 After the step the slip is s = v_t + lambda_t / k_t.  What the springs give way by is taken out of
-the bodies (`jbeamshell.bodies.face_springs`), so that they are no penalty (compare Alart and Curnier
-1991, where k is their rho).
+the bodies (`jbeamshell.bodies.face_springs`), so that they are no penalty (compare Alart and
+Curnier 1991, where k is their rho).
 """
 
 from __future__ import annotations

@@ -59,9 +59,7 @@ class Sprung(NamedTuple):
     softness: Array
 
 
-def sprung(
-    hessian: Array, side: Side, fixed: np.ndarray, coarse: Array
-) -> Sprung:
+def sprung(hessian: Array, side: Side, fixed: np.ndarray, coarse: Array) -> Sprung:
     """Body on springs.
 
     Parameters
@@ -104,7 +102,7 @@ def sprung(
 
 
 def _shape(k: Array, side: Side) -> Array:
-    """Displacement per traction (q, 2) of the points, from the nodes' own stiffness, up to a factor."""
+    """Displacement per traction (q, 2) of the points, from the nodes' stiffness; up to a factor."""
     own = jnp.diag(k).reshape(-1, 3)
     own = jnp.stack([jnp.max(own[:, :2], axis=1), own[:, 2]], axis=1)
     own = jnp.where(own > 0.0, own, jnp.max(own))

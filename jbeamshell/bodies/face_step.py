@@ -38,8 +38,8 @@ class Face(NamedTuple):
     loads : (N, m) f of the load to and fro and of the bolts
     flexibility : (m, m) c, displacements per load while the nodes stay
     nodes : (g, k) nodes of each group of contact points, such as those of an element
-    shares : (q, k, 3, 3) their part B in the displacement of each point, the points of a group after
-        each other; two tangential displacements and the normal one
+    shares : (q, k, 3, 3) their part B in the displacement of each point, two tangential ones and
+        the normal one; the points of a group after each other
     points : numbers of the contact points
     """
 

@@ -1,4 +1,4 @@
-"""Bricks of a box, of 8 or 20 nodes: stiffness and mass, by 2 x 2 x 2 or 3 x 3 x 3 points of Gauss."""
+"""Bricks of a box, of 8 or 20 nodes: stiffness and mass, by points of Gauss."""
 
 import itertools
 
@@ -93,7 +93,9 @@ def side(counts, sizes, places, axis, value, quadratic=False):
     ways = [way for way in range(3) if way != axis]
     edges = np.divide(sizes, counts)[ways]
     start = np.min(places, axis=0)[ways]
-    tree = {tuple(np.round(2.0 * (places[n, ways] - start) / edges).astype(int)): n for n in on_side}
+    tree = {
+        tuple(np.round(2.0 * (places[n, ways] - start) / edges).astype(int)): n for n in on_side
+    }
     around = [(0, 0), (2, 0), (2, 2), (0, 2)]
     around += [(1, 0), (2, 1), (1, 2), (0, 1)] if quadratic else []
     first = itertools.product(*(range(counts[way]) for way in ways))
