@@ -27,6 +27,7 @@ from jbeamshell.numerics.factors import inverse_cholesky, solve
 
 PART = 0.5  # of the flexibility of the nodes' shortest wave, that lies in the springs
 WAVES = 40  # iterations for the shortest wave; `PART` leaves room for what they miss
+EVEN = 0.05  # least spring over the largest one, below which all points have the same
 HELD = 1e2  # stiffness of what a coarser mesh cannot do, over the largest of the body
 
 
@@ -109,8 +110,11 @@ def _shape(k: Array, side: Side) -> Array:
     squares = side.values**2
     share = jnp.zeros(len(own)).at[side.nodes].add(squares * side.areas[:, None])
     share = share * jnp.sum(side.areas) / jnp.sum(share)
-    stiff = jnp.einsum("qk,qkw->qw", squares, (own / share[:, None])[side.nodes])
-    return jnp.sum(squares, axis=1)[:, None] / stiff
+    soft = share[:, None] / own
+    # Shape functions can follow what the springs give way by under an even pressure.
+    found = jnp.einsum("qk,qkw->qw", side.values, soft[side.nodes])
+    even = jnp.min(found, axis=0) > EVEN * jnp.max(found, axis=0)
+    return jnp.where(even, found, jnp.min(soft, axis=0))
 
 
 def _shortest_wave(k: Array, h: Array) -> Array:
