@@ -345,14 +345,6 @@ class ContactHistory(LoopFigures, eqx.Module):
 
     @property
     @quiet
-    def sharing(self) -> Array:
-        """Nodes that share the work of friction of the last cycle, W_i: (sum W_i)^2 / sum W_i^2."""
-        work = self._friction_works
-        squares = self._numbers.sum(work**2)
-        return self._numbers.sum(work) ** 2 / self._numbers.where(squares > 0.0, squares, 1.0)
-
-    @property
-    @quiet
     def _friction_works(self) -> Array:
         """Work of friction (n,) of each node in the last cycle; zero where nothing slips."""
         start, _, stop = self._last
@@ -425,17 +417,17 @@ class ContactHistory(LoopFigures, eqx.Module):
                 "are contacts of their own"
             )
         by = f"{100.0 * error:.2g} %" if error < 1.0 else "100 % or more"
-        said = f"the mesh may put the dissipation off by {by}: mesh face and bodies finer"
+        said, fix = f"the mesh may put the dissipation off by {by}", "mesh face and bodies finer"
         grading = self.grading
         if grading is None:
-            return said
+            return f"{said}: {fix}"
         named = ", ".join(map(str, grading.elements[:MOST_NAMED]))
         more = len(grading.elements) - MOST_NAMED
         named += f" and {more} more" if more > 0 else ""
         left = min(100.0 * grading.left, 100.0)
         return (
-            f"{said}, most in elements {named} of the upper face, which bear "
-            f"{100.0 * grading.share:.0f} % of it; half their size would leave about {left:.2g} %"
+            f"{said}, {100.0 * grading.share:.0f} % of it in elements {named} of the upper face, "
+            f"whose half size would leave about {left:.2g} %: {fix} there"
         )
 
     def figures(self) -> dict[str, Any]:
