@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
 from jbeamshell.bodies.substructure import frames_of
-from jbeamshell.bodies.surface import face_surface
+from jbeamshell.bodies.surface import Elements, face_mesh
 from jbeamshell.bodies.tables import node_table, table_of
 from jbeamshell.common.checks import require, whole_numbers
 from jbeamshell.common.errors import InputError
@@ -69,9 +69,11 @@ def face_rows(
     """
     numbers, places = node_table(nodes)
     towards = (0.0, 0.0, 1.0) if normals is None else normals
+    mesh: Elements = ()
     if elements is not None:
         require("tributary", areas, areas is None, "is that of the elements: leave one out")
-        areas, towards = face_surface(nodes, elements, towards)
+        (shares, towards), mesh = face_mesh(nodes, elements, towards)
+        areas = shares if np.min(shares) > LEVEL * np.max(shares) else None
     row = {(int(a), int(b)): i for i, (a, b) in enumerate(dofs)}
     n = len(numbers)
     normal = np.broadcast_to(np.asarray(towards, float), (n, 3))
@@ -91,7 +93,7 @@ def face_rows(
             fixed[g, int(np.argmax(along))] = True
     turn = scipy.sparse.csr_array(scipy.sparse.block_diag(list(frames)))
     given = {"places": places, "normals": normal, "tributary": areas}
-    return place, turn, given | {"fixed": fixed.ravel().tolist()}
+    return place, turn, given | {"elements": mesh, "fixed": fixed.ravel().tolist()}
 
 
 def condensed_on(

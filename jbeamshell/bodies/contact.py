@@ -26,6 +26,7 @@ from jbeamshell.bodies.contact_input import (
     checked_softness,
     unit_cycles,
 )
+from jbeamshell.bodies.contact_points import contact_points
 from jbeamshell.bodies.levels import Levels
 from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.common.checks import as_leaf, is_traced, require, require_choice, require_number
@@ -132,14 +133,17 @@ def solve_contact(
     else:
         fix = "is given beside path: leave one of them out"
         require("cycles", cycles, cycles is None, fix)
+    made = contact_points(upper, lower, points) if face else None
     sizes = checked_bolts(upper, lower, bolts)
+    smooth = jnp.zeros(())
     problem = Problem(
         upper=upper,
         lower=lower,
-        friction=checked_friction(upper, friction),
-        gap=checked_gap(upper, gap),
-        softness=checked_softness(upper, softness),
-        roughness=checked_roughness(upper, roughness),
+        face=made,
+        friction=checked_friction(upper, made, friction),
+        gap=checked_gap(upper, made, gap),
+        softness=smooth if made is None else checked_softness(made, softness),
+        roughness=smooth if made is None else checked_roughness(made, roughness),
         loads=all_loads(path, sizes, face),
         unit=unit,
         control=control,
@@ -147,22 +151,45 @@ def solve_contact(
         points=points,
         half=steps if unit is not None and cycles is None else None,
     )
-    levels, count, coarse = solver.solved(problem)
-    if not is_traced(levels):
-        levels, count, coarse = jax.device_get((levels, count, coarse))
+    found = solver.solved(problem)
+    if not is_traced(found):
+        found = jax.device_get(found)
+    levels, count, *others = found
     if problem.half is not None and not is_traced(levels):
         unit = unit_path(int(count), steps)
-        levels = jax.tree.map(lambda a: a[: 1 + unit.size], levels)
+        levels = _taken(levels, unit.size, steps, face)
     history = _history(problem, levels, _cycles(problem, unit))
-    if coarse is not None and unit is not None:
-        fewer = jax.tree.map(lambda a: a[: 1 + unit.size // 2], coarse)
+    if others[0] is not None and unit is not None:
         halves = tuple((a // 2, b // 2, c // 2) for a, b, c in history.cycles)
-        half = _history(problem, fewer, halves)
-        history = history.with_change(history.dissipation - half.dissipation)
+        fewer = [
+            _history(problem, _taken(each, unit.size // 2, steps // 2, face), halves)
+            for each in others
+            if each is not None
+        ]
+        history = history.compared_with(*fewer, kind=_kind(problem))
     if throw and not is_traced(history):
         _demand(problem, levels)
         warn_of_doubts(history.doubts, stacklevel=2)
     return history
+
+
+def _kind(problem: Problem) -> str:
+    """Kind of a face's mesh, see `jbeamshell.history.contact_history.MeshChange`."""
+    bodies = [body for body in (problem.upper, problem.lower) if body is not None]
+    if any(len(row) > 4 for body in bodies for row in body.elements):
+        return "quadratic"
+    return "linear" if problem.face is None or problem.face.pairs else "cut"
+
+
+def _taken(levels: Levels, size: int, steps: int, face: bool) -> Levels:
+    """Levels of the pressing, the first loading and the cycles that were taken, 1 + size of them.
+
+    Those of a line come first, those of a face last.
+    """
+    rise = 1 + steps // 2 if face else 1 + size
+    return jax.tree.map(
+        lambda a: np.concatenate([a[:rise], a[len(a) - (1 + size - rise) :]]), levels
+    )
 
 
 def _cycles(problem: Problem, unit: np.ndarray | None) -> tuple[tuple[int, int, int], ...]:
@@ -179,13 +206,16 @@ def _history(
     problem: Problem, levels: Levels, cycles: tuple[tuple[int, int, int], ...]
 ) -> ContactHistory:
     """History of levels, which holds NaN where they are not sound."""
-    upper, sound = problem.upper, levels.sound
+    upper, face, sound = problem.upper, problem.face, levels.sound
+    known = face is None or face.elements is None
+    areas = upper.tributary if known else jnp.asarray(face.areas)  # type: ignore[union-attr]
     names = "loads", "displacements", "slip", "gap", "friction_force", "normal_force", "slip_work"
     values: dict[str, Array] = nan_unless(sound, {name: getattr(levels, name) for name in names})
     history = ContactHistory(
-        places=upper.places,
-        normals=upper.normals,
-        tributary=upper.tributary,
+        places=upper.places if face is None else jnp.asarray(face.places),
+        normals=upper.normals if face is None else jnp.asarray(face.normals),
+        tributary=areas,
+        elements=None if face is None or face.elements is None else jnp.asarray(face.elements),
         **values,
         slipping=levels.slipping,
         status=numbers_of(sound).where(sound, int(Status.CONVERGED), int(Status.MAX_ITERATIONS)),
@@ -193,6 +223,7 @@ def _history(
         iterations=levels.iterations,
         friction=problem.friction,
         change=None,
+        mesh=None,
         cycles=cycles,
         control=problem.control,
         assembly=problem.assembly,

@@ -45,6 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.bodies.deck import Deck
+from jbeamshell.bodies.deck_check import check_deck
 from jbeamshell.bodies.modes import FacePart
 from jbeamshell.bodies.stiffness_model import StiffnessModel
 from jbeamshell.bodies.substructure import Substructure
@@ -109,7 +110,8 @@ def read_parts(
 ) -> tuple[FacePart, FacePart | None, dict[str, Any]]:
     """Upper and lower part of a TOML file, and the other arguments of `jbeamshell.solve_contact`.
 
-    The nodes of both faces are paired by their places, in the order of the upper ones.
+    The contact points lie on the elements of both faces.  Where one has none, the nodes of both are
+    paired by their places, in the order of the upper ones.
 
     Raises
     ------
@@ -128,17 +130,14 @@ def read_parts(
     if "lower" not in values:
         return upper, None, options
     lower = _part("lower", values["lower"], here)
+    if upper.elements is not None and lower.elements is not None:
+        return upper, lower, options
     areas, normals = upper.tributary, upper.normals
     if upper.elements is not None:  # whose nodes are those of the upper body
         areas, normals = face_surface(upper.contact, upper.elements, normals)
     nodes = matched(upper.contact, lower.contact)
-    if "deck" in values["lower"]:
-        own = dict(zip(np.asarray(lower.contact)[:, 0], np.asarray(lower.normals), strict=True))
-        facing = np.sum([own[node] for node in nodes[:, 0]] * np.asarray(normals), axis=1)
-        fix = "faces away from the upper face: name the surface of the body below"
-        name = values["lower"]["face"]
-        require("lower.face", name, bool(np.all(facing > 0.0)), fix)
     lower = lower._replace(contact=nodes, tributary=areas, normals=normals, elements=None)
+    upper = upper._replace(tributary=areas, normals=normals, elements=None)
     return upper, lower, options
 
 
@@ -187,6 +186,8 @@ def _part(key: str, table: Any, here: Path) -> FacePart:
     require(f"{key}.face", None, "face" in table, "name a surface of the deck, or give its nodes")
     deck = _deck(key, table, here)
     model = _model(key, table, here)
+    if deck is not None:
+        check_deck(key, deck, model)
     options: dict[str, Any] = {}
     if deck is None:
         nodes = _table_from(f"{key}.face", table["face"], here)
@@ -200,7 +201,7 @@ def _part(key: str, table: Any, here: Path) -> FacePart:
         nodes, elements = _surface(f"{key}.face", deck, table["face"])
         made = face_surface(nodes, elements)
         outward = 1.0 if key == "lower" else -1.0  # normals point from below to above
-        options |= {"tributary": made.areas, "normals": outward * made.normals}
+        options |= {"elements": elements, "normals": outward * made.normals}
     loads = enumerate(_loads_of(table))
     press = [_load(f"{key}.press[{i}]", deck, load, here) for i, load in loads]
     pull = _load(f"{key}.pull", deck, table["pull"], here) if "pull" in table else None

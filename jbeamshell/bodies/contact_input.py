@@ -9,6 +9,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from jbeamshell.bodies.contact_points import ContactPoints, check_match
 from jbeamshell.bodies.substructure import Substructure, loose_mode
 from jbeamshell.common.checks import (
     as_leaf,
@@ -19,7 +20,6 @@ from jbeamshell.common.checks import (
 )
 from jbeamshell.scene.parts import unit_path
 
-MATCH = 1e-6  # of the contact's extent, within which nodes match
 LEAST_STEPS = 8  # per half cycle on a face
 PRESS = "turn the forces of its table of press instead"
 
@@ -30,9 +30,11 @@ class Problem(NamedTuple):
     Attributes
     ----------
     upper, lower : bodies; lower is None on a rigid base
-    friction : mu, () or (n,)
-    gap : (n,) distance of the nodes before anything presses
-    softness, roughness : (n, 3) and (n, 2) of the surfaces of a face, by nodal forces
+    face : contact points of a face; None on a line
+    friction : mu, () or, on a face, (q,) of the contact points
+    gap : (n,) of the nodes, on a face (q,), before anything presses
+    softness, roughness : (q, 2) of the surfaces of a face, tangential and normal displacement per
+        force, and h and F_0
     loads : (levels + 1, m) load to and fro, then the pressing ones; the pressing alone comes first
     unit : (levels,) loads of the problem's cycles over their amplitude; None for a path of its own
     control, assembly, points : as `jbeamshell.solve_contact` takes them
@@ -41,6 +43,7 @@ class Problem(NamedTuple):
 
     upper: Substructure
     lower: Substructure | None
+    face: ContactPoints | None
     friction: Array
     gap: Array
     softness: Array
@@ -59,34 +62,16 @@ def check_bodies(upper: Substructure, lower: Substructure | None) -> None:
         fits = isinstance(body, Substructure) or (body is None and key == "lower")
         require(key, type(body).__name__, fits, "give a jbeamshell.Substructure")
     if lower is not None:
-        _check_match(upper, lower)
+        said = "another kind of contact"
+        fix = "the upper body touches on a line, or this one does: give both a line, or a face"
+        require("lower.places", said, upper.on_face == lower.on_face, fix)
         if not upper.on_face:
+            check_match(upper, lower)
             _check_held(upper, lower)
     bodies = [body for body in (upper, lower) if body is not None]
     pulls = [body.forces[:, 0] for body in bodies] + [body.flexibility[0] for body in bodies]
     pulled = is_traced(pulls) or any(bool(np.any(np.asarray(pull))) for pull in pulls)
     require("pull", 0, pulled, "nothing pulls the bodies: condense one with pull=")
-
-
-def _check_match(upper: Substructure, lower: Substructure) -> None:
-    """Refuse contacts whose nodes or normals do not match."""
-    ours, theirs = upper.places.shape, lower.places.shape
-    fix = f"does not match the {ours[0]} nodes of the upper body: mesh both contacts alike"
-    said = f"{theirs[0]} nodes" if len(ours) == len(theirs) else "another kind of contact"
-    require("lower.places", said, ours == theirs, fix)
-    if is_traced(upper, lower):
-        return
-    places, below = (np.asarray(b.places).reshape(ours[0], -1) for b in (upper, lower))
-    apart = np.linalg.norm(places - below, axis=1)
-    worst = int(np.argmax(apart))
-    at = ", ".join(f"{number:.6g}" for number in places[worst])
-    fix = f"does not match node {worst} of the upper body at {at}, in the same order: mesh both "
-    near = apart[worst] <= MATCH * float(np.max(np.ptp(places, axis=0)))
-    require(f"lower.places[{worst}]", below[worst], near, fix + "alike")
-    if upper.on_face:
-        turned = np.max(np.abs(np.asarray(upper.normals) - np.asarray(lower.normals)))
-        fix = "must be those of the upper face, from the body below to the one above"
-        require("lower.normals", f"{turned:.3g} off", bool(turned < MATCH), fix)
 
 
 def _check_held(upper: Substructure, lower: Substructure) -> None:
@@ -129,37 +114,38 @@ def checked_bolts(upper: Substructure, lower: Substructure | None, bolts: ArrayL
     return jnp.broadcast_to(sizes, (count,))
 
 
-def checked_gap(upper: Substructure, gap: ArrayLike) -> Array:
-    """Gap (n,) of the nodes."""
+def checked_gap(upper: Substructure, face: ContactPoints | None, gap: ArrayLike) -> Array:
+    """Gap (n,) of the nodes of a line, or (q,) of the contact points of a face."""
     n = upper.places.shape[0]
     distance = as_leaf(gap, "gap")
     fix = f"give a number, or one for each of {n} nodes"
     require("gap", gap, distance.shape in ((), (n,)), fix)
     _require_not_negative("gap", gap, distance, "bodies cannot overlap before anything presses")
-    return jnp.broadcast_to(distance, (n,))
+    distance = jnp.broadcast_to(distance, (n,))
+    return distance if face is None else face.upper.of(distance)
 
 
-def checked_friction(upper: Substructure, friction: ArrayLike) -> Array:
-    """Coulomb's coefficient, () or, on a face, (n,)."""
+def checked_friction(upper: Substructure, face: ContactPoints | None, friction: ArrayLike) -> Array:
+    """Coulomb's coefficient, () or, on a face, (q,)."""
     value, n = as_leaf(friction, "friction"), upper.places.shape[0]
     shapes = ((), (n,)) if upper.on_face else ((),)
     fix = f"give a number, or one for each of {n} nodes" if upper.on_face else "give one number"
     require("friction", friction, value.shape in shapes, fix)
     _require_not_negative("friction", friction, value)
-    return value
+    return face.upper.of(value) if face is not None and value.ndim else value
 
 
-def checked_softness(upper: Substructure, softness: ArrayLike) -> Array:
-    """Displacement per force (n, 3) of a face's surfaces at each node, in its frame."""
+def checked_softness(face: ContactPoints, softness: ArrayLike) -> Array:
+    """Displacement per force (q, 2) of a face's surfaces at each point, tangential and normal."""
     soft = as_leaf(softness, "softness")
     fix = "give a number, or a tangential and a normal one"
     require("softness", softness, soft.shape in ((), (2,)), fix)
     _require_not_negative("softness", softness, soft)
-    return jnp.broadcast_to(soft, (2,))[np.array([0, 0, 1])] / _areas(upper)[:, None]
+    return jnp.broadcast_to(soft, (2,)) / jnp.asarray(face.areas)[:, None]
 
 
-def checked_roughness(upper: Substructure, roughness: ArrayLike) -> Array:
-    """Height h and force F_0 (n, 2) of a face's surfaces at each node."""
+def checked_roughness(face: ContactPoints, roughness: ArrayLike) -> Array:
+    """Height h and force F_0 (q, 2) of a face's surfaces at each point."""
     rough = as_leaf(roughness, "roughness")
     if rough.ndim == 0 and not is_traced(rough) and float(rough) == 0.0:
         rough = jnp.array([0.0, 1.0])
@@ -167,7 +153,7 @@ def checked_roughness(upper: Substructure, roughness: ArrayLike) -> Array:
     _require_not_negative("roughness", roughness, rough)
     fix = "needs a pressure above 0: that at which surfaces are twice as stiff as at first touch"
     require("roughness", roughness, is_traced(rough) or bool(rough[1] > 0.0), fix)
-    areas = _areas(upper)[:, None]
+    areas = jnp.asarray(face.areas)[:, None]
     return jnp.broadcast_to(rough, (areas.size, 2)) * jnp.concatenate([areas**0, areas], axis=1)
 
 
@@ -206,11 +192,6 @@ def all_loads(targets: ArrayLike, sizes: Array, on_face: bool) -> Array:
         path = path[:, None] * jnp.eye(1, pressing.size) + pressing
     require("path", path.shape, path.shape[1] == pressing.size, fix)
     return jnp.concatenate([pressing[None], path])
-
-
-def _areas(upper: Substructure) -> Array:
-    """Areas (n,) of the nodes; 1 where they are not known, so that pressures are forces."""
-    return jnp.ones(upper.places.shape[0]) if upper.tributary is None else upper.tributary
 
 
 def _require_not_negative(

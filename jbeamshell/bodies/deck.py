@@ -1,7 +1,7 @@
 """Mesh of a CalculiX or Abaqus deck: its nodes, and the faces of its elements that it names.
 
-What is read are ``*NODE``, ``*ELEMENT``, ``*ELSET`` and ``*SURFACE`` of a flat deck; all else is
-passed over.
+What is read are ``*NODE``, ``*ELEMENT``, ``*ELSET``, ``*SURFACE``, ``*ELASTIC`` and ``*DENSITY`` of
+a flat deck; all else is passed over.
 """
 
 from __future__ import annotations
@@ -25,6 +25,12 @@ FACES = {
     6: ("132", "456", "1254", "2365", "3146"),
     8: ("1432", "5678", "1265", "2376", "3487", "4158"),
 }
+# Ends of the edges whose middles are the nodes after the corners, in turn.
+EDGES = {
+    4: ("12", "23", "13", "14", "24", "34"),
+    6: ("12", "23", "13", "45", "56", "46", "14", "25", "36"),
+    8: ("12", "23", "34", "14", "56", "67", "78", "58", "15", "26", "37", "48"),
+}
 CORNERS = {4: 4, 6: 6, 8: 8, 10: 4, 15: 6, 20: 8}  # of an element by the number of its nodes
 FLAT = ("PART", "INSTANCE", "ASSEMBLY")
 
@@ -45,11 +51,14 @@ class Deck(NamedTuple):
     places : X, Y and Z by node
     elements : nodes by element
     surfaces : by name, elements and the numbers of their faces
+    elastic, densities : Young's modulus and Poisson's ratio, and the density, of each material
     """
 
     places: dict[int, list[float]]
     elements: dict[int, list[int]]
     surfaces: dict[str, list[tuple[int, int]]]
+    elastic: list[tuple[float, float]]
+    densities: list[float]
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Deck:
@@ -61,7 +70,7 @@ class Deck(NamedTuple):
             if the file cannot be read, is no deck or has parts, or one of its lines makes no sense
         """
         text = read_bytes(path).decode("latin-1")
-        deck, sets = cls({}, {}, {}), dict[str, list[int]]()
+        deck, sets = cls({}, {}, {}, [], []), dict[str, list[int]]()
         for card in _cards(text, Path(path).parent):
             try:
                 _take(deck, sets, card)
@@ -99,7 +108,7 @@ class Deck(NamedTuple):
         return np.array([[node, *self.places[node]] for node in nodes]), rows
 
     def _corners(self, name: str, element: int, face: int) -> list[int]:
-        """Nodes of a face of an element, its corners and those on its edges."""
+        """Nodes of a face of an element, its corners and then those on its edges, in turn."""
         key = f"{name}, element {element}"
         nodes = self.elements.get(element)
         if nodes is None:
@@ -107,12 +116,16 @@ class Deck(NamedTuple):
         corners = CORNERS.get(len(nodes), 0)
         fix = f"has {len(nodes)} nodes: give bricks, wedges or tetrahedra"
         require("surface", key, corners > 0, fix)
-        fix = "has nodes on its edges, whose forces are no pressures: mesh it with linear elements"
-        require("surface", key, corners == len(nodes), fix)
         sides = FACES[corners]
         fix = f"has the faces S1 to S{len(sides)}"
         require("surface", f"{key}, S{face}", 1 <= face <= len(sides), fix)
-        return [nodes[int(corner) - 1] for corner in sides[face - 1]]
+        around = [int(corner) for corner in sides[face - 1]]
+        row = [nodes[corner - 1] for corner in around]
+        if len(nodes) > corners:
+            ends = zip(around, [*around[1:], around[0]], strict=True)
+            middles = [EDGES[corners].index("".join(map(str, sorted(end)))) for end in ends]
+            row += [nodes[corners + middle] for middle in middles]
+        return row
 
 
 def _cards(text: str, folder: Path) -> Iterator[Card]:
@@ -179,6 +192,12 @@ def _take(deck: Deck, sets: dict[str, list[int]], card: Card) -> None:
         for which, side, *_ in rows:
             elements = [int(which)] if which.isdigit() else sets[which.upper()]
             faces.extend((element, int(side.upper().removeprefix("S"))) for element in elements)
+    elif keyword == "ELASTIC" and options.get("TYPE", "ISO").upper().startswith("ISO"):
+        deck.elastic.append((float(rows[0][0]), float(rows[0][1])))
+    elif keyword == "ELASTIC":
+        deck.elastic.extend([(np.nan, np.nan), (0.0, 0.0)])  # of no use to check by
+    elif keyword == "DENSITY":
+        deck.densities.append(float(rows[0][0]))
 
 
 def _nodes_of(kind: str, rows: list[list[str]]) -> int:

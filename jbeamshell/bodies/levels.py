@@ -47,8 +47,10 @@ class Found(NamedTuple):
     cycles : number of cycles until the loop is steady, of a path that goes on until it is
     coarse : levels in half as many load steps, every second one; None where events are walked, and
         where they are of no use
+    coarser : the same on a coarser mesh of a face; None where there is none
     """
 
     levels: Levels
     cycles: Array
     coarse: Levels | None = None
+    coarser: Levels | None = None

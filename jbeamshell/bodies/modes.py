@@ -24,6 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import eigsh
 
 from jbeamshell.bodies.contact import solve_contact
+from jbeamshell.bodies.contact_points import contact_points
+from jbeamshell.bodies.face_bodies import Stiffer, stiffer
 from jbeamshell.bodies.stiffness_model import StiffnessModel
 from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.common.checks import as_leaf, is_traced, require, require_count
@@ -84,8 +86,8 @@ class ModalBodies(NamedTuple):
     ----------
     upper, lower : bodies for `jbeamshell.solve_contact`; lower is None on a rigid base
     omega : angular frequency of the mode while the face sticks
-    touching : (n,) True for the pairs that the bolts press together
-    begins : modal displacement at which friction no longer bears the force on one of the pairs
+    touching : (q,) True for the contact points that the bolts press together
+    begins : modal displacement at which friction no longer bears the force on one of them
     slides : modal displacement at which friction would bear the forces on the stuck face in sum
     friction, bolts, gap : of the pressing
     """
@@ -101,7 +103,7 @@ class ModalBodies(NamedTuple):
     gap: Number
 
     def __str__(self) -> str:
-        pairs = f"{self.touching.size} pairs, of which {int(np.sum(self.touching))} touch"
+        pairs = f"{self.touching.size} contact points, of which {int(np.sum(self.touching))} touch"
         rows = [
             ("frequency, stuck", f"{self.omega / (2.0 * np.pi):.6g}"),
             ("slip begins at", f"{self.begins:.6g} modal displacement"),
@@ -124,7 +126,7 @@ def modal_bodies(
 ) -> ModalBodies:
     """Bodies on their face, loaded by the inertia of a mode.
 
-    The mode is that of the pressed bodies, whose pairs stick where they touch.
+    The mode is that of the pressed bodies, whose contact points stick where they touch.
 
     Parameters
     ----------
@@ -149,13 +151,13 @@ def modal_bodies(
         *pressed, friction=friction, bolts=sizes, gap=gap, path=np.append(0.0, sizes)[None]
     )
     touching = np.asarray(history.touching[0])
-    found = _stuck_mode(parts, touching, mode)
+    found = _stuck_mode(parts, pressed, touching, mode)
     bodies = _bodies(parts, found.inertia)
-    borne = np.einsum("nij,nj->ni", bodies[0].frames, found.borne)[touching]
+    borne = found.borne[touching]
     shear, normal = np.linalg.norm(borne[:, :2], axis=1), np.abs(borne[:, 2])
     rough = np.broadcast_to(history.friction, touching.shape)[touching]
     holds = rough * np.asarray(history.normal_force[0])[touching]
-    # A pair lets go where its shear meets the friction of what the mode leaves of its reaction.
+    # A point lets go where its shear meets the friction of what the mode leaves of its reaction.
     pulled, size = shear + rough * normal, float(np.sum(shear))
     return ModalBodies(
         upper=bodies[0],
@@ -282,14 +284,14 @@ def face_curve(
 
 
 def _bodies(parts: list[FacePart], pulls: Sequence[ArrayLike | None]) -> list[Substructure]:
-    """Bodies with other pulls, all with the areas and normals of the first one."""
+    """Bodies with other pulls; those without elements have the areas and normals of the first."""
     first = parts[0]._replace(pull=pulls[0]).body()
-    areas, normals = first.tributary, first.normals
-    others = [
-        part._replace(pull=pull, tributary=areas, normals=normals, elements=None).body()
-        for part, pull in zip(parts[1:], pulls[1:], strict=True)
-    ]
-    return [first, *others]
+    bodies = [first]
+    for part, pull in zip(parts[1:], pulls[1:], strict=True):
+        if part.elements is None:
+            part = part._replace(tributary=first.tributary, normals=first.normals)
+        bodies.append(part._replace(pull=pull).body())
+    return bodies
 
 
 class Stuck(NamedTuple):
@@ -299,7 +301,8 @@ class Stuck(NamedTuple):
     ----------
     omega : angular frequency
     inertia : for each body the rows (node, direction, force) of M phi
-    borne : (n, 3) force on the nodes of the upper face, along X, Y and Z, per modal displacement
+    borne : (q, 3) force of the contact points on the upper face, in their frames, per modal
+        displacement
     """
 
     omega: float
@@ -307,12 +310,27 @@ class Stuck(NamedTuple):
     borne: NDArray[np.float64]
 
 
-def _stuck_mode(parts: list[FacePart], touching: NDArray[np.bool_], mode: int) -> Stuck:
+def _stuck_mode(
+    parts: list[FacePart], bodies: list[Substructure], touching: NDArray[np.bool_], mode: int
+) -> Stuck:
     """Mode of a number, rigid motions not counted."""
-    ties = _ties(parts, touching)
+    below = bodies[1] if len(bodies) > 1 else None
+    made = contact_points(bodies[0], below, False)
     stiffness = scipy.sparse.block_diag([part.model.matrix for part in parts], format="csc")
     mass = scipy.sparse.block_diag([part.model.mass for part in parts], format="csc")
-    k, m = (scipy.sparse.csc_array(ties.T @ each @ ties) for each in (stiffness, mass))
+    if made.elements is None:
+        ties = _ties(parts, touching)
+        moved = None
+        k, m = (scipy.sparse.csc_array(ties.T @ each @ ties) for each in (stiffness, mass))
+    else:
+        added = stiffer(bodies[0], below, made)
+        turned = [_onto_face(part, body) for part, body in zip(parts, bodies, strict=True)]
+        moved = _moves_of(added, turned)
+        held = moved[np.repeat(touching, 3)]
+        springs = scipy.sparse.diags_array(added.springs[touching].ravel())
+        more = [turn.T @ extra @ turn for turn, extra in zip(turned, added.bodies, strict=True)]
+        k = stiffness + scipy.sparse.block_diag(more, format="csc") + held.T @ springs @ held
+        k, m, ties = scipy.sparse.csc_array(k), mass, scipy.sparse.eye_array(mass.shape[0])
     count = mode + 7
     fix = f"must be less than {k.shape[0] - 7}, the free displacements"
     require("mode", mode, count < k.shape[0], fix)
@@ -325,15 +343,42 @@ def _stuck_mode(parts: list[FacePart], touching: NDArray[np.bool_], mode: int) -
     shape = ties @ vectors[:, at]
     shape *= np.sign(shape[np.argmax(np.abs(shape))])
     inertia, begin, tables = mass @ shape, 0, []
-    borne = stiffness @ shape - values[at] * inertia
     for part in parts:
         rows = inertia[begin : begin + len(part.model.dofs)]
         tables.append(np.column_stack([part.model.dofs, rows]))
         begin += len(part.model.dofs)
-    force = {(int(a), int(b)): f for (a, b), f in zip(parts[0].model.dofs, borne, strict=False)}
-    face = np.asarray(parts[0].contact, float)[:, 0].astype(int).tolist()
-    on_face = [[force.get((node, way), 0.0) for way in (1, 2, 3)] for node in face]
-    return Stuck(float(np.sqrt(values[at])), tables, np.array(on_face))
+    if moved is not None:
+        borne = -added.springs * (moved @ shape).reshape(-1, 3)
+        return Stuck(float(np.sqrt(values[at])), tables, borne)
+    force = stiffness @ shape - values[at] * inertia
+    on_upper = force[: len(parts[0].model.dofs)]
+    borne = (_onto_face(parts[0], bodies[0]) @ on_upper).reshape(-1, 3)
+    return Stuck(float(np.sqrt(values[at])), tables, borne)
+
+
+def _onto_face(part: FacePart, body: Substructure) -> scipy.sparse.csr_array:
+    """Displacements (3n, N) of a face's nodes in their frames, from those of its model."""
+    row = {(int(a), int(b)): i for i, (a, b) in enumerate(part.model.dofs)}
+    nodes = np.asarray(part.contact, float)[:, 0].astype(int).tolist()
+    at = np.array([[row.get((node, way), -1) for way in (1, 2, 3)] for node in nodes])
+    rows = np.broadcast_to(np.arange(3 * len(nodes)).reshape(-1, 3, 1), (len(nodes), 3, 3))
+    columns = np.broadcast_to(at[:, None], rows.shape)
+    there = columns >= 0
+    shape = (3 * len(nodes), len(part.model.dofs))
+    return scipy.sparse.csr_array((body.frames[there], (rows[there], columns[there])), shape=shape)
+
+
+def _moves_of(added: Stiffer, turned: list[scipy.sparse.csr_array]) -> scipy.sparse.csr_array:
+    """Displacements (3q, N) of the contact points, upper ones over lower ones, from all models."""
+    parts = []
+    for sign, (nodes, shares), turn in zip((1.0, -1.0), added.shares, turned, strict=False):
+        q, k = nodes.shape
+        rows = np.broadcast_to(np.arange(3 * q).reshape(q, 1, 3, 1), (q, k, 3, 3))
+        columns = np.broadcast_to((3 * nodes[:, :, None] + np.arange(3))[:, :, None], rows.shape)
+        shape = (3 * q, turn.shape[0])
+        entries = sign * shares.ravel(), (rows.ravel(), columns.ravel())
+        parts.append(scipy.sparse.csr_array(entries, shape=shape) @ turn)
+    return scipy.sparse.csr_array(scipy.sparse.hstack(parts))
 
 
 def _ties(parts: list[FacePart], touching: NDArray[np.bool_]) -> scipy.sparse.csc_array:

@@ -22,8 +22,16 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from jbeamshell.bodies.face_elements import CORNERS
 from jbeamshell.common.arrays import read_arrays, write_arrays
-from jbeamshell.common.checks import as_leaf, is_traced, require, require_choice, require_finite
+from jbeamshell.common.checks import (
+    as_leaf,
+    is_traced,
+    require,
+    require_choice,
+    require_finite,
+    whole_numbers,
+)
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, check_regular
 
@@ -32,6 +40,7 @@ LOOSE = {1: 1e-11, 2: 1e-9}  # of the largest eigenvalue: below it a mode costs 
 BENT = 1e-3  # part of a motion without energy that may be no rigid one
 MODES = ("moves along X", "moves along the normal", "turns")
 NAMES = ("places", "normals", "tributary", "stiffness", "forces", "flexibility")
+NONE = -1  # in place of a node, in rows of elements with fewer nodes than others
 FORMER = {"x": "places", "areas": "tributary"}  # names that files may have instead
 
 
@@ -52,6 +61,8 @@ class Substructure(eqx.Module):
         all; along Z if left out.  None on a line
     tributary : (n,) contact length of each node, or area on a face.  If left out, half the way to
         the neighbours, and None on a face, whose areas are then not known
+    elements : of a face, the places of their nodes in ``places``, in turn around the normals, see
+        `jbeamshell.face_surface`; without them nodes are contact points
     fixed : (k n,) True for displacements that a support holds; none if left out
 
     Raises
@@ -75,6 +86,7 @@ class Substructure(eqx.Module):
     flexibility: Array
     normals: Array | None
     tributary: Array | None
+    elements: tuple[tuple[int, ...], ...] = eqx.field(static=True)
     fixed: tuple[bool, ...] = eqx.field(static=True)
 
     def __init__(
@@ -86,6 +98,7 @@ class Substructure(eqx.Module):
         *,
         normals: Any = None,
         tributary: Any = None,
+        elements: Sequence[Sequence[int]] = (),
         fixed: Sequence[bool] = (),
     ) -> None:
         self.places, self.stiffness = as_leaf(places, "places"), as_leaf(stiffness, "stiffness")
@@ -108,6 +121,14 @@ class Substructure(eqx.Module):
             if tributary is None:
                 half = 0.5 * jnp.diff(self.places)
                 self.tributary = jnp.append(half, 0.0) + jnp.append(0.0, half)
+        fix = "are those of a face: leave them out"
+        require("elements", len(elements), self.on_face or not elements, fix)
+        for i, row in enumerate(elements):
+            fits = len(row) in CORNERS and len(set(row)) == len(row)
+            fits = fits and all(isinstance(k, int | np.integer) and 0 <= k < n for k in row)
+            fix = f"give the places 0 to {n - 1} of 3, 4, 6, 8 or 9 nodes"
+            require(f"elements[{i}]", row, fits, fix)
+        self.elements = tuple(tuple(map(int, row)) for row in elements)
         for i, truth in enumerate(fixed):
             require_choice(f"fixed[{i}]", truth, (False, True))
         self.fixed = tuple(map(bool, fixed)) or (False,) * (self.ways * n)
@@ -182,13 +203,17 @@ class Substructure(eqx.Module):
         """Frames (n, 3, 3) of the nodes of a face: two tangents and the normal, by rows."""
         return frames_of(np.asarray(self.normals))
 
-    def rigid_motions(self) -> NDArray[np.float64]:
-        """Rigid motions (k, nodes' displacements): along each axis, and turns about the middle.
+    def rigid_motions(self, about: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Rigid motions (k, nodes' displacements): along each axis, and turns.
 
         Three on a line (along X, along the normal, a turn), six on a face.
+
+        Parameters
+        ----------
+        about : place about which it turns, the middle of the nodes if left out
         """
         places = np.asarray(self.places)
-        n, middle = len(places), places - np.mean(places, axis=0)
+        n, middle = len(places), places - (np.mean(places, axis=0) if about is None else about)
         if not self.on_face:
             moves = np.zeros((3, n, 2))
             moves[0, :, 0] = moves[1, :, 1] = 1.0
@@ -204,6 +229,11 @@ class Substructure(eqx.Module):
         require("path", str(path), target.suffix == ".npz", "end the name in .npz")
         known = {name: value for name in NAMES if (value := getattr(self, name)) is not None}
         arrays = {name: np.asarray(value) for name, value in known.items()}
+        if self.elements:
+            rows = np.full((len(self.elements), max(map(len, self.elements))), NONE)
+            for table, row in zip(rows, self.elements, strict=True):
+                table[: len(row)] = row
+            arrays["elements"] = rows
         write_arrays(target, arrays | {"fixed": np.array(self.fixed)})
 
     @classmethod
@@ -231,7 +261,12 @@ class Substructure(eqx.Module):
         fix = "give numpy.savez places=, stiffness=, forces=, or read a jbeamshell.StiffnessModel"
         require(str(path), f"without {', '.join(missing)}", not missing, fix)
         given = {name: arrays[name] for name in NAMES if name in arrays}
-        return cls(**given, fixed=np.ravel(arrays.get("fixed", ())).tolist())
+        rows = np.asarray(arrays.get("elements", np.zeros((0, 0))))
+        fix = "give one row for each element, its shorter rows filled with -1"
+        require("elements.shape", rows.shape, rows.ndim == 2, fix)
+        elements = [row[row != NONE].tolist() for row in whole_numbers("elements", rows)]
+        fixed = np.ravel(arrays.get("fixed", ())).tolist()
+        return cls(**given, elements=elements, fixed=fixed)
 
 
 def frames_of(normals: NDArray[np.float64]) -> NDArray[np.float64]:

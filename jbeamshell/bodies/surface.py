@@ -2,9 +2,10 @@
 
 With N_i the shape function of node i, and x(u, v) the place on an element,
 
-    A_i = int N_i |x_u x x_v| du dv,    n_i ~ int N_i x_u x x_v du dv,
+    A_i = int N_i |x_u x x_v| du dv,    n_i ~ int N_i^2 x_u x x_v du dv,
 
 so that an even pressure p has the nodal forces p A_i (Zienkiewicz and Taylor 2000, chapter 8).
+Those of quadratic elements are zero or negative at their corners.
 """
 
 from __future__ import annotations
@@ -16,21 +17,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from jbeamshell.bodies.face_elements import CORNERS as COUNTS
+from jbeamshell.bodies.face_elements import RULES, Spots, spots
 from jbeamshell.bodies.tables import node_table
 from jbeamshell.common.checks import require, whole_numbers
 from jbeamshell.common.errors import InputError
 
-ELEMENTS = "give rows of the 3 or 4 nodes of each element, in turn around it"
-QUADRATIC = (
-    "has nodes on its edges, whose corners bear nothing or pull under an even pressure: "
-    "mesh the face with linear elements"
-)
+ELEMENTS = "give rows of the 3, 4, 6, 8 or 9 nodes of each element, corners in turn around it first"
+Elements = tuple[tuple[int, ...], ...]
 MATCH = 1e-6  # of the face's extent, within which nodes match
 SIDE = 0.1  # cosine to the direction that is given, from which on a side of an element is meant
 FLAT = 1e-9  # of the largest element, below which one has no area
-# Corners of the square, and where its area is summed up: 2 x 2 points of Gauss, of weight 1.
-CORNERS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-POINTS = CORNERS / np.sqrt(3.0)
 
 
 class Surface(NamedTuple):
@@ -48,46 +45,61 @@ def face_surface(
     Parameters
     ----------
     nodes : (n, 4) node, X, Y and Z
-    elements : the nodes of each triangle or quadrilateral, in turn around it; both may be mixed
+    elements : the nodes of each triangle or quadrilateral: its corners in turn around it, then the
+        middles of its edges in turn, then its middle; 3, 4, 6, 8 or 9 nodes, which may be mixed
     towards : (3,) or (n, 3) direction of the side to which the normals point, roughly; None is
         the side from which the nodes of an element turn counter-clockwise
 
     Raises
     ------
     InputError
-        for a node that no element has, an element with another node, without area, with more than
-        4 nodes, or whose side is not clear
+        for a node that no element has, an element with another node, without area, with another
+        number of nodes, or whose side is not clear
+    """
+    return face_mesh(nodes, elements, towards)[0]
+
+
+def face_mesh(
+    nodes: ArrayLike, elements: Iterable[ArrayLike], towards: ArrayLike | None = None
+) -> tuple[Surface, Elements]:
+    """Areas and normals of `face_surface`, and the elements.
+
+    The elements are the places of their nodes in the table of nodes, in turn around the normals.
     """
     numbers, places = node_table(nodes)
     index = {node: i for i, node in enumerate(numbers)}
     n = len(numbers)
     sides = None if towards is None else np.broadcast_to(np.asarray(towards, float), (n, 3))
-    areas, normals = np.zeros(n), np.zeros((n, 3))
-    names = _rows(elements)
-    parts = [_shares(places[[_place(index, k, node) for node in row]]) for k, row in names]
-    whole = np.array([np.linalg.norm(np.sum(part, axis=0)) for part in parts])
+    areas, sizes, normals = np.zeros(n), np.zeros(n), np.zeros((n, 3))
+    names, rows = _rows(elements), []
+    parts = [_parts(places[[_place(index, k, node) for node in row]]) for k, row in names]
+    whole = np.array([np.linalg.norm(np.sum(part.normals, axis=0)) for part in parts])
     for (k, row), part, size in zip(names, parts, whole, strict=True):
         at = [index[node] for node in row]
-        turn = np.sign(part @ np.sum(part, axis=0))
-        clear = bool(size > FLAT * np.max(whole) and np.all(turn > 0.0))
+        total = np.sum(part.normals, axis=0)
+        clear = bool(size > FLAT * np.max(whole) and np.all(part.normals @ total > 0.0))
         fix = "has no area, or crosses itself: name its nodes in turn around it"
         require(f"elements[{k}]", row, clear, fix)
-        along = np.sum(part, axis=0) / size
+        sign = 1.0
         if sides is not None:
             way = np.mean(sides[at], axis=0)
-            cosine = float(along @ way) / max(float(np.linalg.norm(way)), np.finfo(float).tiny)
+            length = max(float(np.linalg.norm(way)), np.finfo(float).tiny)
+            cosine = float(total @ way) / size / length
             fix = "lies along the normals that are given: say to which side it faces"
             require(f"elements[{k}]", row, abs(cosine) > SIDE, fix)
-            part = part * np.sign(cosine)
-        np.add.at(areas, at, np.linalg.norm(part, axis=1))
-        np.add.at(normals, at, part)
-    lost = [node for node, area in zip(numbers, areas, strict=True) if area == 0.0]
+            sign = float(np.sign(cosine))
+        rows.append(tuple(at) if sign > 0.0 else _turned(at))
+        lengths = np.linalg.norm(part.normals, axis=1)
+        np.add.at(areas, at, part.values.T @ lengths)
+        np.add.at(sizes, at, (part.values**2).T @ lengths)
+        np.add.at(normals, at, sign * (part.values**2).T @ part.normals)
+    lost = [node for node, size in zip(numbers, sizes, strict=True) if size == 0.0]
     require("nodes", lost[:1], not lost, "is in no element of the face: leave it out")
     lengths = np.linalg.norm(normals, axis=1)
-    for node, area, length in zip(numbers, areas, lengths, strict=True):
+    for node, size, length in zip(numbers, sizes, lengths, strict=True):
         fix = "has elements that face to opposite sides: order their nodes alike, or say normals"
-        require("nodes", f"node {node}", length > SIDE * area, fix)
-    return Surface(areas, normals / lengths[:, None])
+        require("nodes", f"node {node}", length > SIDE * size, fix)
+    return Surface(areas, normals / lengths[:, None]), tuple(rows)
 
 
 def spread(
@@ -144,8 +156,7 @@ def _rows(elements: Iterable[ArrayLike]) -> list[tuple[int, list[int]]]:
         key = f"elements[{k}]"
         row = whole_numbers(key, np.ravel(np.asarray(given))).tolist()
         row = [node for i, node in enumerate(row) if node != row[i - 1]]
-        require(key, row, len(row) not in (6, 8, 9), QUADRATIC)
-        require(key, row, len(set(row)) == len(row) in (3, 4), ELEMENTS)
+        require(key, row, len(set(row)) == len(row) in COUNTS, ELEMENTS)
         first = known.setdefault(tuple(sorted(row)), k)
         require(key, row, first == k, f"is elements[{first}] again: name each once")
         found.append((k, row))
@@ -160,15 +171,15 @@ def _place(index: dict[int, int], k: int, node: int) -> int:
     return index[node]
 
 
-def _shares(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Normals (k, 3) of an element's nodes, as long as the nodes' areas."""
-    if len(corners) == 3:
-        normal = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0])
-        return np.tile(normal / 3.0, (3, 1))
-    total = np.zeros((4, 3))
-    for u, v in POINTS:
-        a, b = 1.0 + CORNERS[:, 0] * u, 1.0 + CORNERS[:, 1] * v
-        along, across = 0.25 * CORNERS[:, 0] * b, 0.25 * CORNERS[:, 1] * a
-        normal = np.cross(along @ corners, across @ corners)
-        total += 0.25 * np.outer(a * b, normal)
-    return total
+def _parts(corners: NDArray[np.float64]) -> Spots:
+    """Quadrature points of an element, the normals as long as the areas of the points."""
+    rule = RULES[len(corners)]
+    found = spots(corners, rule.points)
+    return found._replace(normals=found.normals * rule.weights[:, None])
+
+
+def _turned(row: list[int]) -> tuple[int, ...]:
+    """Nodes of an element in turn around it the other way."""
+    count = COUNTS[len(row)]
+    corners, edges = row[:count], row[count : 2 * count]
+    return (*corners[::-1], *edges[-2::-1], *edges[-1:], *row[2 * count :])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
@@ -29,13 +29,49 @@ FIGURES = (
     "peak_displacement",
     "closure",
 )
+OF_FACE = ("step_error", "mesh_error", "stuck_stiffness", "gross_slip")
 OUT_OF_BALANCE = 1e-4  # force over the largest reaction, from which on a result is doubted
 NO_SLIP = {1: 1e-12, 2: 1e-9}  # work over that of the loop's width, taken as zero
 TOUCHES = 1e-9  # of the largest reaction, below which a reaction is that of an open pair, rounded
-FEW = 10.0  # pairs of a face that share the work of friction, below which the mesh decides about it
-MESH = 3.0  # error of the dissipation over one per pair that shares it: measured .5 to 3, and up to
-# 10 where nearly all of the face slides
+# Error of the dissipation by the mesh, over what a mesh of twice the size changes: measured .5 to
+# 1.9 of linear elements, 3.4 to 4.4 of those that do not match, .1 to .65 of quadratic ones.
+MESH = {"linear": 2.0, "cut": 4.0, "quadratic": 0.7}
+COARSE = 0.1  # error by the mesh, from which on a result is doubted
+SHARES = 0.8  # of the error by the mesh, that the elements bear which are named
+MOST_NAMED = 8  # elements that a doubt names
+HALVED = 0.25  # of its error, that an element of half the size leaves, as errors fall with h^2
 PRESSED = {"frictionless": "pressed without friction", "frictional": "pressed with friction"}
+
+
+class MeshChange(NamedTuple):
+    """Last cycle on a mesh of twice the size, less that on the mesh itself.
+
+    Attributes
+    ----------
+    dissipation, stiffness : changes over the values themselves
+    works : (n,) change of the work of friction of each contact point
+    kind : "quadratic" elements, "linear" ones, or "cut" for linear ones that do not match
+    """
+
+    dissipation: Array
+    stiffness: Array
+    works: Array
+    kind: str
+
+
+class Grading(NamedTuple):
+    """Elements that would have to be smaller, and what that would leave.
+
+    Attributes
+    ----------
+    elements : of the upper face, those with most of the error first
+    share : part of the error by the mesh that they bear
+    left : relative error of the dissipation with these elements of half the size
+    """
+
+    elements: tuple[int, ...]
+    share: float
+    left: float
 
 
 class ContactHistory(LoopFigures, eqx.Module):
@@ -45,9 +81,11 @@ class ContactHistory(LoopFigures, eqx.Module):
 
     Attributes
     ----------
-    places : (n,) X of the nodes of a contact line, or (n, 3) of those of a face
+    places : (n,) X of the nodes of a contact line, or (n, 3) of the contact points of a face:
+        points on its elements, or pairs of nodes where it has none
     normals : (n, 3) normals of a face; None on a line
-    tributary : (n,) contact length or area of each node; None on a face whose areas are not known
+    tributary : (n,) contact length or area of each; None on a face whose areas are not known
+    elements : (n,) element of the upper face on which each point lies; None for nodes
     loads, displacements : (steps+1, m) loads, the one to and fro first, and the displacements
         conjugate to them since the pressing
     slip : (steps+1, n) slip of the upper nodes over the lower ones since the pressing; on a face
@@ -63,6 +101,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     friction : Coulomb's coefficient mu, a number or (n,)
     change : dissipation less that of every second load step; None where steps have no error, or it
         was not estimated
+    mesh : change of the last cycle by a mesh of twice the size; None where it was not estimated
     cycles : steps at the start, the turn and the end of each closed cycle
     control : "force" or "displacement", what the amplitude is of
     assembly : "frictionless" or "frictional", how the bodies were pressed together
@@ -77,6 +116,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     places: Array
     normals: Array | None
     tributary: Array | None
+    elements: Array | None
     loads: Array
     displacements: Array
     slip: Array
@@ -90,14 +130,33 @@ class ContactHistory(LoopFigures, eqx.Module):
     iterations: Array
     friction: Array
     change: Array | None
+    mesh: MeshChange | None
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     control: str = eqx.field(static=True)
     assembly: str = eqx.field(static=True)
     points: bool = eqx.field(static=True)
 
-    def with_change(self, change: Array) -> ContactHistory:
-        """History with the change of the dissipation by half of the load steps."""
-        return dataclasses.replace(self, change=change)
+    def compared_with(
+        self, fewer: ContactHistory, coarser: ContactHistory | None = None, kind: str = "linear"
+    ) -> ContactHistory:
+        """History with its change by half of the load steps, and by a coarser mesh in as many.
+
+        Parameters
+        ----------
+        fewer : the same contact in half of the load steps
+        coarser : the same on a mesh of twice the size; None if there is none
+        kind : of the mesh, see `MeshChange`
+        """
+        lost, mesh = fewer.dissipation, None
+        if coarser is not None and coarser.converged and fewer.converged:
+            with np.errstate(all="ignore"):
+                mesh = MeshChange(
+                    dissipation=coarser.dissipation / lost - 1.0,
+                    stiffness=coarser.secant_stiffness / fewer.secant_stiffness - 1.0,
+                    works=coarser._friction_works - fewer._friction_works,
+                    kind=kind,
+                )
+        return dataclasses.replace(self, change=self.dissipation - lost, mesh=mesh)
 
     @property
     def on_face(self) -> bool:
@@ -214,22 +273,75 @@ class ContactHistory(LoopFigures, eqx.Module):
         """Estimated relative error of the dissipation.
 
         On a line that of the mesh, see `jbeamshell.history.error_estimates.grid_error`; infinite if
-        nothing slips.  On a face that of the load steps, by which half of them change the
-        dissipation; NaN if it was not estimated, and 0 if nothing slips.
+        nothing slips.  On a face that of the load steps and of the mesh together; NaN if the steps
+        were not estimated, and 0 if nothing slips.
         """
         if self.on_face:
-            change = self._numbers.nan if self.change is None else self._numbers.abs(self.change)
-            lost = self._numbers.where(self._slips, self.dissipation, 1.0)
-            return self._numbers.where(self._slips, change / lost, 0.0)
+            mesh = self._numbers.nan_to_num(self.mesh_error, nan=0.0)
+            return self.step_error + self._numbers.where(self._slips, mesh, 0.0)
         return grid_error(self._friction_works)
 
     @property
     @quiet
-    def sharing(self) -> Array:
-        """Nodes that share the work of friction of the last cycle, W_i: (sum W_i)^2 / sum W_i^2."""
-        work = self._friction_works
-        squares = self._numbers.sum(work**2)
-        return self._numbers.sum(work) ** 2 / self._numbers.where(squares > 0.0, squares, 1.0)
+    def step_error(self) -> Array:
+        """Relative error of the dissipation by the load steps of a face.
+
+        Half of the steps change the dissipation by as much.
+        """
+        change = self._numbers.nan if self.change is None else self._numbers.abs(self.change)
+        lost = self._numbers.where(self._slips, self.dissipation, 1.0)
+        return self._numbers.where(self._slips, change / lost, 0.0)
+
+    @property
+    @quiet
+    def mesh_error(self) -> Array:
+        """Relative error of the dissipation by the mesh of a face and of its bodies.
+
+        It comes from a mesh of twice the size; NaN if that was not taken, and 0 for points that are
+        contacts of their own.
+        """
+        if self.points:
+            return self._numbers.zeros(())
+        if self.mesh is None:
+            return self._numbers.full((), self._numbers.nan)
+        return MESH[self.mesh.kind] * self._numbers.abs(self.mesh.dissipation)
+
+    @property
+    @quiet
+    def stuck_stiffness(self) -> Array:
+        """Stiffness just after the load turns, while all of the contact still sticks.
+
+        It depends on the mesh far less than the dissipation.
+        """
+        _, turn, _ = self._last
+        return (self.force[turn + 1] - self.force[turn]) / (
+            self.displacement[turn + 1] - self.displacement[turn]
+        )
+
+    @property
+    def gross_slip(self) -> Array:
+        """Friction that all of the contact bears at the turn of the load, mu N.
+
+        It does not depend on the mesh where the loads alone press.
+        """
+        turn = self._last[1] if self.cycles else -1
+        return self._numbers.sum(self.friction * self.normal_force[turn])
+
+    @property
+    def grading(self) -> Grading | None:
+        """Elements that would have to be smaller; None where the mesh was not compared."""
+        if self.mesh is None or self.elements is None:
+            return None
+        sizes = np.bincount(np.asarray(self.elements), np.abs(np.asarray(self.mesh.works)))
+        total = float(np.sum(sizes))
+        if not total > 0.0:
+            return None
+        order = np.argsort(-sizes)
+        count = int(np.searchsorted(np.cumsum(sizes[order]), SHARES * total)) + 1
+        named = order[:count]
+        share = float(np.sum(sizes[named])) / total
+        left = float(self.mesh_error) * (1.0 - share * (1.0 - HALVED))
+        return Grading(tuple(named.tolist()), share, left)
 
     @property
     @quiet
@@ -284,22 +396,39 @@ class ContactHistory(LoopFigures, eqx.Module):
     @property
     def _coarse(self) -> tuple[str, ...]:
         """Doubts about the load steps and the mesh."""
-        error = float(self.dissipation_error)
         if not self.on_face:
-            return () if self.points else doubts_of_mesh(error)
-        doubts = []
+            return () if self.points else doubts_of_mesh(float(self.dissipation_error))
+        doubts, error, mesh = [], float(self.step_error), float(self.mesh_error)
         if error > TOLERANCE:
             doubts.append(
                 f"the dissipation may be off by {100.0 * error:.2g} %: take more "
                 "steps_per_half_cycle"
             )
-        pairs = float(self.sharing)
-        if bool(self._slips) and pairs < FEW and not self.points:
-            doubts.append(
-                f"only {pairs:.1f} pairs share the slip, so that the mesh may put the dissipation "
-                f"off by {min(100.0 * MESH / pairs, 100.0):.0f} %: mesh the face finer"
-            )
+        if bool(self._slips) and not mesh <= COARSE and self.change is not None:
+            doubts.append(self._coarse_mesh(mesh))
         return tuple(doubts)
+
+    def _coarse_mesh(self, error: float) -> str:
+        """Doubt about a mesh with such an error, or with one that is not known."""
+        if np.isnan(error):
+            return (
+                "the mesh has an error that is not known, because it has too few nodes to compare "
+                "it with a coarser one: mesh the bodies finer, or take points=True for nodes that "
+                "are contacts of their own"
+            )
+        by = f"{100.0 * error:.2g} %" if error < 1.0 else "100 % or more"
+        said, fix = f"the mesh may put the dissipation off by {by}", "mesh face and bodies finer"
+        grading = self.grading
+        if grading is None:
+            return f"{said}: {fix}"
+        named = ", ".join(map(str, grading.elements[:MOST_NAMED]))
+        more = len(grading.elements) - MOST_NAMED
+        named += f" and {more} more" if more > 0 else ""
+        left = min(100.0 * grading.left, 100.0)
+        return (
+            f"{said}, {100.0 * grading.share:.0f} % of it in elements {named} of the upper face, "
+            f"whose half size would leave about {left:.2g} %: {fix} there"
+        )
 
     def figures(self) -> dict[str, Any]:
         """Figures of the last cycle and of the contact at the last step, as plain numbers.
@@ -309,7 +438,8 @@ class ContactHistory(LoopFigures, eqx.Module):
         dict
             numbers by name, None where undefined (such as 0/0), and the doubts
         """
-        values = {name: float(getattr(self, name)) for name in FIGURES if self.cycles}
+        names = FIGURES + (OF_FACE if self.on_face else ())
+        values = {name: float(getattr(self, name)) for name in names if self.cycles}
         extent = "area" if self.on_face else "length"
         if self.tributary is None:
             values["normal_force_max"] = float(self._numbers.max(self.normal_force[-1]))
@@ -323,9 +453,11 @@ class ContactHistory(LoopFigures, eqx.Module):
         return found | {"assembly": self.assembly, "doubts": list(self.doubts)}
 
     def __str__(self) -> str:
-        where = "of a contact face" if self.on_face else "of a contact line"
-        count = self.gap.shape[1]
-        title = f"{self.force.size} levels on {count} nodes {where}, {PRESSED[self.assembly]}"
+        where = f"{self.gap.shape[1]} nodes of a contact line"
+        if self.on_face:
+            where = f"{self.gap.shape[1]} {'pairs of nodes' if self.elements is None else 'points'}"
+            where += " of a contact face"
+        title = f"{self.force.size} levels on {where}, {PRESSED[self.assembly]}"
         # Forces and works on a line are per width.
         units = UNITS | {"opening_max": "length", "contact_length": "length"}
         units = {name: word for name, word in units.items() if not self.on_face}

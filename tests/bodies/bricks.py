@@ -1,4 +1,4 @@
-"""Trilinear bricks of a box: stiffness and mass, by 2 x 2 x 2 points of Gauss."""
+"""Bricks of a box, of 8 or 20 nodes: stiffness and mass, by points of Gauss."""
 
 import itertools
 
@@ -8,33 +8,47 @@ import scipy.sparse
 import jbeamshell as jb
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+POWERS = np.array(list(itertools.product((0, 1), repeat=3)))
+EVERY = list(itertools.product((-1.0, 0.0, 1.0), repeat=3))
+EDGES = np.array([place for place in EVERY if place.count(0.0) < 2])
+SERENDIPITY = np.array(
+    [row for row in itertools.product(range(3), repeat=3) if sum(k for k in row if k > 1) <= 2]
+)
 
 
-def box(counts, sizes, at=(0.0, 0.0, 0.0), modulus=210e3, poisson=0.3, density=7.85e-9, held=None):
+def box(
+    counts,
+    sizes,
+    at=(0.0, 0.0, 0.0),
+    modulus=210e3,
+    poisson=0.3,
+    density=7.85e-9,
+    held=None,
+    quadratic=False,
+):
     """Model of a box, and the places (N, 3) of its nodes, numbered from 1.
 
     ``held`` is True for the places that do not move.
     """
-    edges = np.divide(sizes, counts)
-    axes = [a + np.linspace(0.0, s, n + 1) for a, s, n in zip(at, sizes, counts, strict=True)]
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    number = np.arange(places[..., 0].size).reshape(places.shape[:3])
-    nx, ny, nz = counts
-    bricks = np.stack(
-        [
-            number[a : a + nx, b : b + ny, c : c + nz].ravel()
-            for a, b, c in itertools.product((0, 1), repeat=3)
-        ],
-        axis=1,
-    )
-    k, m = brick(edges, modulus, poisson, density)
-    dofs = (3 * bricks[:, :, None] + np.arange(3)).reshape(len(bricks), 24)
-    where = np.repeat(dofs, 24, axis=1).ravel(), np.tile(dofs, (1, 24)).ravel()
+    edges, step = np.divide(sizes, counts), 2 if quadratic else 1
+    fine = [step * n for n in counts]
+    axes = [a + np.linspace(0.0, s, n + 1) for a, s, n in zip(at, sizes, fine, strict=True)]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(places)).reshape([n + 1 for n in fine])
+    nodes = EDGES if quadratic else CORNERS
+    away = ((1.0 + nodes) * step / 2).astype(int)
+    first = [step * np.array(place) for place in itertools.product(*map(range, counts))]
+    bricks = np.array([number[tuple((place + away).T)] for place in first])
+    used, bricks = np.unique(bricks, return_inverse=True)
+    places, bricks = places[used], bricks.reshape(len(first), len(nodes))
+    k, m = brick(edges, modulus, poisson, density, quadratic)
+    size = 3 * len(nodes)
+    dofs = (3 * bricks[:, :, None] + np.arange(3)).reshape(len(bricks), size)
+    where = np.repeat(dofs, size, axis=1).ravel(), np.tile(dofs, (1, size)).ravel()
     stiffness, mass = (
         scipy.sparse.csc_array(scipy.sparse.coo_array((np.tile(e.ravel(), len(bricks)), where)))
         for e in (k, m)
     )
-    places = places.reshape(-1, 3)
     rows = np.column_stack(
         [np.repeat(np.arange(1, len(places) + 1), 3), np.tile([1, 2, 3], len(places))]
     )
@@ -43,35 +57,82 @@ def box(counts, sizes, at=(0.0, 0.0, 0.0), modulus=210e3, poisson=0.3, density=7
     return jb.StiffnessModel(stiffness[stay][:, stay], rows[stay], mass[stay][:, stay]), places
 
 
-def brick(edges, modulus, poisson, density):
-    """Stiffness and mass (24, 24) of a brick."""
+def brick(edges, modulus, poisson, density, quadratic=False):
+    """Stiffness and mass (24, 24) of a brick, or (60, 60) with nodes on its edges."""
     shear = modulus / (2.0 * (1.0 + poisson))
     lame = modulus * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
     law = np.diag([2.0 * shear] * 3 + [shear] * 3)
     law[:3, :3] += lame
-    stiffness, mass = np.zeros((24, 24)), np.zeros((24, 24))
-    volume = np.prod(edges) / 8.0
-    for point in CORNERS / np.sqrt(3.0):
-        factors = 0.5 * (1.0 + CORNERS * point)
-        shape = np.prod(factors, axis=1)
-        slopes = np.stack(
-            [
-                0.5
-                * CORNERS[:, d]
-                * np.prod(np.delete(factors, d, axis=1), axis=1)
-                * 2.0
-                / edges[d]
-                for d in range(3)
-            ],
-            axis=1,
-        )
-        strain = np.zeros((6, 8, 3))
+    nodes, powers = (EDGES, SERENDIPITY) if quadratic else (CORNERS, POWERS)
+    inverse = np.linalg.inv(np.prod(nodes[:, None] ** powers, axis=2))
+    at, weights = np.polynomial.legendre.leggauss(3 if quadratic else 2)
+    size = 3 * len(nodes)
+    stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
+    for which in itertools.product(range(len(at)), repeat=3):
+        point, volume = at[list(which)], np.prod(weights[list(which)] * edges / 2.0)
+        shape = np.prod(point**powers, axis=1) @ inverse
+        slopes = np.zeros((len(nodes), 3))
+        for d in range(3):
+            lower = np.maximum(powers - np.eye(3, dtype=int)[d], 0)
+            slopes[:, d] = 2.0 / edges[d] * (powers[:, d] * np.prod(point**lower, axis=1)) @ inverse
+        strain = np.zeros((6, len(nodes), 3))
         for d in range(3):
             strain[d, :, d] = slopes[:, d]
         for row, (a, b) in enumerate(((0, 1), (1, 2), (0, 2)), start=3):
             strain[row, :, a], strain[row, :, b] = slopes[:, b], slopes[:, a]
-        b_matrix = strain.reshape(6, 24)
+        b_matrix = strain.reshape(6, size)
         stiffness += volume * b_matrix.T @ law @ b_matrix
         n_matrix = np.kron(shape, np.eye(3))
         mass += density * volume * n_matrix.T @ n_matrix
     return stiffness, mass
+
+
+def side(counts, sizes, places, axis, value, quadratic=False):
+    """Nodes (k, 4) and elements of the side of a box, corners in turn and then edges."""
+    on_side = np.flatnonzero(np.isclose(places[:, axis], value))
+    ways = [way for way in range(3) if way != axis]
+    edges = np.divide(sizes, counts)[ways]
+    start = np.min(places, axis=0)[ways]
+    tree = {
+        tuple(np.round(2.0 * (places[n, ways] - start) / edges).astype(int)): n for n in on_side
+    }
+    around = [(0, 0), (2, 0), (2, 2), (0, 2)]
+    around += [(1, 0), (2, 1), (1, 2), (0, 1)] if quadratic else []
+    first = itertools.product(*(range(counts[way]) for way in ways))
+    elements = [[1 + tree[2 * i + a, 2 * j + b] for a, b in around] for i, j in first]
+    return np.column_stack([on_side + 1, places[on_side]]), elements
+
+
+SIZES = (60.0, 30.0, 15.0)
+
+
+def two_blocks(upper, lower=None, quadratic=False, sizes=SIZES):
+    """Block on another one that is held below, pressed by 1 over its top and pulled at its end.
+
+    ``upper`` and ``lower`` are bricks along, across and through each; the lower ones are the upper
+    ones if left out.
+    """
+    lower = upper if lower is None else lower
+    height = sizes[2]
+    model, places = box(upper, sizes, quadratic=quadratic)
+    on = {"quadratic": quadratic}
+    top, tops = side(upper, sizes, places, 2, height, **on)
+    end, ends = side(upper, sizes, places, 0, sizes[0], **on)
+    face, elements = side(upper, sizes, places, 2, 0.0, **on)
+    press, pull = (jb.face_surface(*a).areas for a in ((top, tops), (end, ends)))
+    above = model.condensed(
+        face,
+        elements=elements,
+        press=[np.column_stack([top[:, 0], np.full(len(top), 3), -press / np.sum(press)])],
+        pull=np.column_stack([end[:, 0], np.full(len(end), 1), pull / np.sum(pull)]),
+    )
+    model, places = box(
+        lower,
+        sizes,
+        at=(0.0, 0.0, -height),
+        held=lambda places: places[:, 2] == -height,
+        quadratic=quadratic,
+    )
+    face, elements = side(lower, sizes, places, 2, 0.0, **on)
+    nothing = [[int(face[0, 0]), 3, 0.0]]
+    return above, model.condensed(face, elements=elements, press=[nothing])

@@ -62,7 +62,9 @@ class TestModes:
         *_, bodies = leaves()
         curve = jb.face_curve(bodies, [1e-9], **OPTIONS, throw=False)
         assert float(curve.frequency[0]) == pytest.approx(bodies.omega / (2 * np.pi), rel=1e-3)
-        assert str(bodies).startswith(f"bodies pulled into a mode, {bodies.touching.size} pairs")
+        assert str(bodies).startswith(
+            f"bodies pulled into a mode, {bodies.touching.size} contact points"
+        )
         assert len(str(bodies)) < 300
 
     def test_all_pairs_tied_are_one_body(self):
