@@ -277,6 +277,14 @@ class TestTransient:
         stored = 0.5 * x @ structure.stuck_stiffness @ x
         assert float(begun.stored[0]) == pytest.approx(float(stored), rel=1e-9)
 
+    @pytest.mark.doubtful("energy balance is open")
+    def test_a_spring_beside_the_sliders_takes_its_part(self):
+        joint = Joint([1.0, 3.0], [1.0, 2.0])  # of half the stiffness; nothing slips below 1
+        mass = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
+        motion = dynamics.shake(mass, 2.0 * np.pi, displacement=[0.5])
+        swing = 0.5 * np.cos(np.asarray(motion.time))
+        np.testing.assert_allclose(motion.displacement[:, 0], swing, atol=1e-3)
+
     def test_an_interrupted_motion_keeps_the_part_computed(self):
         with pytest.raises(dynamics.InterruptedMotionError, match="ends at t") as cut:
             dynamics.shake(chain(), 50.0, velocity=[1.0, 0.0], samples=2001, most_steps=200)
