@@ -180,7 +180,7 @@ class TestHistory:
             "contact.stick_stiffness": 50.0,
         }
         scene = MOVED.replace(lifting)
-        path = 5e-5 * np.append(np.arange(1, 5) / 4.0, 1.0 - np.arange(1, STEPS - 3) / 8.0)
+        path = 1e-4 * np.append(np.arange(1, 5) / 4.0, 1.0 - np.arange(1, STEPS - 3) / 8.0)
         steps = jb.solve(scene, path, throw=False)
         line = scene.replace({"model.by": "auto"}).on_grid(41, scene.plan.end_size)
         exact = jb.solve(line, path, throw=False)
@@ -188,8 +188,9 @@ class TestHistory:
         assert not steps.scene.plan.on_contact_line
         assert float(exact.gap.max()) > 1e-7
         # Slip spreads evenly from node to node on the contact line; in load steps nodes slip whole.
-        np.testing.assert_allclose(exact.force, steps.force, atol=0.02 * np.max(steps.force))
-        assert np.sum(exact.slip_work) == pytest.approx(float(np.sum(steps.slip_work)), rel=0.05)
+        np.testing.assert_allclose(exact.force, steps.force, atol=5e-3 * np.max(steps.force))
+        assert np.sum(exact.slip_work) == pytest.approx(float(np.sum(steps.slip_work)), rel=0.02)
+        assert float(exact.gap.max()) == pytest.approx(float(steps.gap.max()), rel=0.02)
 
 
 class TestFigures:
