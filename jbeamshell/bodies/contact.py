@@ -154,19 +154,19 @@ def solve_contact(
     found = solver.solved(problem)
     if not is_traced(found):
         found = jax.device_get(found)
-    levels, count, *others = found
+    levels, count, coarse, coarser = found
     if problem.half is not None and not is_traced(levels):
         unit = unit_path(int(count), steps)
         levels = _taken(levels, unit.size, steps, face)
     history = _history(problem, levels, _cycles(problem, unit))
-    if others[0] is not None and unit is not None:
+    if coarse is not None and unit is not None:
         halves = tuple((a // 2, b // 2, c // 2) for a, b, c in history.cycles)
-        fewer = [
-            _history(problem, _taken(each, unit.size // 2, steps // 2, face), halves)
-            for each in others
-            if each is not None
+        both = [
+            each and _history(problem, _taken(each, unit.size // 2, steps // 2, face), halves)
+            for each in (coarse, coarser)
         ]
-        history = history.compared_with(*fewer, kind=_kind(problem))
+        assert both[0] is not None
+        history = history.compared_with(both[0], both[1], _kind(problem))
     if throw and not is_traced(history):
         _demand(problem, levels)
         warn_of_doubts(history.doubts, stacklevel=2)

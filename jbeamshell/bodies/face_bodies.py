@@ -86,7 +86,8 @@ def stiffer(upper: Substructure, lower: Substructure | None, made: ContactPoints
     """Springs of contact points between bodies, and these without what the springs give way by."""
     bodies = [body for body in (upper, lower) if body is not None]
     count = max(body.forces.shape[1] for body in bodies)
-    sides, more, soft = [], [], 0.0
+    sides, more = [], []
+    soft = np.zeros((made.areas.size, 2))
     for body, shares in zip(bodies, (made.upper, made.lower), strict=False):
         assert shares is not None
         side = side_of(made._replace(upper=shares, pairs=True), body, False)
@@ -136,7 +137,7 @@ def _assembled(
     stiffness += jnp.diag(jnp.where(held, jnp.max(stiffness), 0.0))
     loads = jnp.where(held[:, None], 0.0, -hessian[:size, size:])
     shares = jnp.where(jnp.asarray(held.reshape(-1, 3))[nodes][:, :, None], 0.0, shares)
-    soft = sum(part.softness for part in parts)
+    soft = functools.reduce(jnp.add, (part.softness for part in parts))
     q = soft.shape[0]
     stays = jnp.all(jnp.abs(shares) == 0.0, axis=(1, 3))
     points = Points(
@@ -181,8 +182,8 @@ def side_of(made: ContactPoints, body: Substructure, below: bool) -> Side:
         own = body.frames[shares.nodes]
         turned = np.einsum("qix,qkjx->qkij", frames_of(made.normals), own)
     return Side(
-        nodes=np.asarray(shares.nodes),
-        values=np.asarray(shares.values),
+        nodes=shares.nodes,
+        values=shares.values,
         shares=shares.values[:, :, None, None] * turned,
         areas=made.areas,
     )

@@ -17,7 +17,7 @@ are the nodes, nothing is left of S, and the contact is rigid.  The bodies that 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -41,10 +41,10 @@ class Side(NamedTuple):
     areas : (q,)
     """
 
-    nodes: Array
-    values: Array
-    shares: Array
-    areas: Array
+    nodes: Any
+    values: Any
+    shares: Any
+    areas: Any
 
 
 class Sprung(NamedTuple):

@@ -131,7 +131,7 @@ def _levels_of(
 WALKS = Small(_levels_of, level=0), Small(_levels_of)
 
 
-def _walk(inputs: tuple[Face, Array, Array], *settings: Any) -> tuple[Steps, Array]:
+def _walk(inputs: tuple[Face, Array, Any], *settings: Any) -> tuple[Steps, Array]:
     """Levels of the path and the number of cycles, by the program that suits the face.
 
     That of a large face takes longer to compile, and less to run.
