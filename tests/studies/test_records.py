@@ -120,7 +120,7 @@ def test_iwans_model_is_right_under_bolts_alone_as_the_page_says():
         pairs = np.array([row["fitted_errors"] for row in own])
         return np.median(pairs[:, 0]), np.max(pairs[:, 1])
 
-    page = (ROOT / "notebooks" / "pages" / "drawing.md").read_text("utf-8")
+    page = (ROOT / "notebooks" / "pages" / "lap_joints.md").read_text("utf-8")
     for words, patch in (("single lap, one bolt", "single lap"), ("middle half of", "middle")):
         line = next(line for line in page.splitlines() if line.startswith(f"| {words}"))
         told = [float(number) / 100.0 for number in re.findall(r"(\d+) %", line)]
