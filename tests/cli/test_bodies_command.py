@@ -59,7 +59,7 @@ BAD = [
     ('face = "FACE"\npress', 'face = "FLANGE"\npress', "upper.face: surface = 'FLANGE': is"),
     ('"BOLT_2"', '"BOLT_3"', "upper.press[1]: surface = 'BOLT_3': is none of the deck's: FACE"),
     ('deck = "lower.inp"', 'deck = "none.inp"', "none.inp"),
-    ('deck = "lower.inp"', 'deck = "upper.inp"', "lower.face = 'FACE': faces away"),
+    ('deck = "lower.inp"', 'deck = "upper.inp"', "= 'a side': faces away"),
     ("direction = 1", "direction = 4", "upper.pull.direction = 4"),
     ('{ surface = "END", direction = 1 }', '"END"', "upper.pull = 'END': write pull = {"),
     ("friction = 0.2", "frictoin = 0.2", "key frictoin"),
