@@ -161,12 +161,12 @@ def solve_contact(
     history = _history(problem, levels, _cycles(problem, unit))
     if coarse is not None and unit is not None:
         halves = tuple((a // 2, b // 2, c // 2) for a, b, c in history.cycles)
-        both = [
-            each and _history(problem, _taken(each, unit.size // 2, steps // 2, face), halves)
-            for each in (coarse, coarser)
-        ]
-        assert both[0] is not None
-        history = history.compared_with(both[0], both[1], _kind(problem))
+
+        def of_levels(levels: Levels) -> ContactHistory:
+            return _history(problem, _taken(levels, unit.size // 2, steps // 2, face), halves)
+
+        mesh = None if coarser is None else of_levels(coarser)
+        history = history.compared_with(of_levels(coarse), mesh, _kind(problem))
     if throw and not is_traced(history):
         _demand(problem, levels)
         warn_of_doubts(history.doubts, stacklevel=2)

@@ -68,7 +68,7 @@ def bodies_of(problem: Problem, coarse: tuple[NDArray[np.float64], ...] | None =
 
 
 class Stiffer(NamedTuple):
-    """What springs of contact points add to the bodies that they lie between.
+    """Springs of contact points, and the stiffness that they add to the bodies between them.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from jbeamshell.scene import load_path
     from jbeamshell.solving import solve as solving
     from jbeamshell.solving.advice import within
-    from jbeamshell.solving.sensitivity import is_bolted, sensitivity
+    from jbeamshell.solving.sensitivity import is_bolted, sensitivity, slips
 
     scene = within(scene_of(options), options.tol)
     load_path.check(scene)
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     figures = history.figures() | timing
     units = SI if options.specimen_in_si else {}
     lines = [*options.bolted, history.summary(units).as_text()]
-    if is_bolted(scene) and scene.member.support != "none":
+    if is_bolted(scene) and scene.member.support != "none" and slips(history):
         found = sensitivity(history, options.scatter)
         figures |= found.figures()
         lines.append(found.summary(*("N", "J", "m") * options.specimen_in_si).as_text())

@@ -34,7 +34,8 @@ OUT_OF_BALANCE = 1e-4  # force over the largest reaction, from which on a result
 NO_SLIP = {1: 1e-12, 2: 1e-9}  # work over that of the loop's width, taken as zero
 TOUCHES = 1e-9  # of the largest reaction, below which a reaction is that of an open pair, rounded
 # Error of the dissipation by the mesh, over what a mesh of twice the size changes: measured .5 to
-# 1.9 of linear elements, 3.4 to 4.4 of those that do not match, .1 to .65 of quadratic ones.
+# 1.9 of linear elements, 3.4 to 4.4 of those that do not match, .1 to .65 of quadratic ones, on two
+# blocks alone.
 MESH = {"linear": 2.0, "cut": 4.0, "quadratic": 0.7}
 COARSE = 0.1  # error by the mesh, from which on a result is doubted
 SHARES = 0.8  # of the error by the mesh, that the elements bear which are named

@@ -152,7 +152,7 @@ class SaidModel(NamedTuple):
 def said(
     specimen: Specimen, dimensions: Mapping[str, Any], folder: Path
 ) -> SaidStrip | SaidLaw | SaidModel:
-    """What a specimen says of its model, with its dimensions and values.
+    """Strip, law or model that a specimen says, with its dimensions and values.
 
     Raises
     ------

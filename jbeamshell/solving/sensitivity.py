@@ -2,7 +2,8 @@
 
 Slopes are logarithmic, d ln D/d ln x: D changes by so many per cent where x changes by one.  They
 are central differences of whole runs, which are smooth in these numbers: they agree with automatic
-derivatives to 1e-6, which take a minute to compile where this takes a second.
+derivatives to 1e-6, which take a minute to compile where this takes a second.  Next to gross slip,
+where less friction has no equilibrium, they are one-sided.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import Summary, ranged, with_unit
 from jbeamshell.history.history import History
 from jbeamshell.scene.scene import Scene
@@ -114,6 +116,11 @@ def is_bolted(scene: Scene) -> bool:
     return float(scene.contact.friction) > 0.0 and scene.load.kind == "force"
 
 
+def slips(history: History) -> bool:
+    """True if a run loses energy in its last cycle, so that its logarithm has slopes."""
+    return float(history.dissipation) > 0.0 and bool(np.isfinite(history.dissipation_error))
+
+
 def sensitivity(scene: Scene | History, scatter: float = 0.0) -> Sensitivity:
     """Sensitivity of a bolted joint's dissipation to its friction and to each of its bolts.
 
@@ -125,7 +132,8 @@ def sensitivity(scene: Scene | History, scatter: float = 0.0) -> Sensitivity:
     Raises
     ------
     InputError
-        for a scene without bolts, friction or a cycle of a force
+        for a scene without bolts, friction or a cycle of a force, and for one in which nothing
+        slips, or whose neighbours have no equilibrium
 
     Examples
     --------
@@ -138,16 +146,27 @@ def sensitivity(scene: Scene | History, scatter: float = 0.0) -> Sensitivity:
     fix = "has none: a sensitivity needs contact.bolts, friction and a cycle of a force"
     require("scene", "bolts", is_bolted(given), fix)
     history = run(given) if history is None else history
-    pinned = history.scene.pinned()
+    fix = "has no slopes, because nothing slips: take a larger load.amplitude"
+    require("dissipation", float(history.dissipation), slips(history), fix)
+    pinned, own = history.scene.pinned(), float(history.dissipation)
     rows, mu = np.asarray(given.get("contact.bolts"), float), float(given.contact.friction)
 
-    def slope(changed: Any) -> float:
-        works = (
-            float(run(pinned.replace(changed(1.0 + way * STEP)), throw=False).dissipation)
-            for way in (1.0, -1.0)
-        )
-        high, low = works
-        return float(np.log(high / low) / np.log((1.0 + STEP) / (1.0 - STEP)))
+    def lost(changed: dict[str, Any]) -> float | None:
+        """Dissipation of a neighbour; None if it slides as a whole or a step fails."""
+        try:
+            found = run(pinned.replace(changed), throw=False)
+        except InputError:
+            return None
+        return float(found.dissipation) if found.converged and slips(found) else None
+
+    def slope(key: str, changed: Any) -> float:
+        factors = [1.0 + way * STEP for way in (1.0, -1.0)]
+        pairs = [(factor, lost(changed(factor))) for factor in factors]
+        known = [(factor, work) for factor, work in (*pairs, (1.0, own)) if work is not None]
+        fix = "has no slope: neither a little more nor a little less of it has an equilibrium"
+        require(key, "of the joint", len(known) > 1, fix)
+        (high, above), (low, below) = known[:2]
+        return float(np.log(above / below) / np.log(high / low))
 
     def tightened(place: int, factor: float) -> dict[str, Any]:
         new = rows.copy()
@@ -156,13 +175,16 @@ def sensitivity(scene: Scene | History, scatter: float = 0.0) -> Sensitivity:
         follows = {} if given.contact.bolted else {"contact.bottom_pressure": given.get(BOTTOM)}
         return {"contact.bolts": new} | follows
 
-    bolts = [slope(lambda factor, at=at: tightened(at, factor)) for at in range(len(rows))]
+    bolts = [
+        slope(f"contact.bolts[{at}]", lambda factor, at=at: tightened(at, factor))
+        for at in range(len(rows))
+    ]
     control = given.load.control == "force"
     return Sensitivity(
-        slope(lambda factor: {"contact.friction": mu * factor}),
+        slope("contact.friction", lambda factor: {"contact.friction": mu * factor}),
         np.array(bolts),
         rows[:, 0],
-        float(history.dissipation),
+        own,
         float(given.gross_slip),
         float(given.get("load.amplitude")) if control else 0.0,
         scatter,

@@ -108,7 +108,7 @@ def test_own_energy_takes_the_place_of_the_homogeneous_one():
         np.testing.assert_allclose(
             getattr(got, name) / scale, getattr(expected, name) / scale, atol=1e-9, err_msg=name
         )
-    assert np.all(soft.displacement[1:3] > 1.02 * expected.displacement[1:3])
+    assert np.all(soft.displacement[1:3] > 1.15 * expected.displacement[1:3])  # 20 and 25 %
 
 
 @pytest.mark.slow

@@ -175,3 +175,14 @@ def test_a_width_beside_a_scene_per_width_is_refused(capsys):
 def test_only_bolted_joints_have_a_sensitivity():
     with pytest.raises(jb.InputError, match=r"needs contact.bolts, friction"):
         jb.sensitivity(jb.Scene())
+
+
+@pytest.mark.doubtful("nothing slips")
+@SWAYS
+def test_where_nothing_slips_there_is_a_run_and_no_slope(capsys):
+    joint = jb.LapJoint(**DRAWING | {"force": "1 N"}, change=GRID)
+    with pytest.raises(jb.InputError, match=r"^dissipation = .*nothing slips: take a larger load"):
+        joint.sensitivity(joint.solve())
+    words = shlex.split(COMMAND.replace("4kN", "1N"))
+    assert main.main([*words, "--set", "model.nodes=65"]) == 0
+    assert "% of friction" not in capsys.readouterr().out
