@@ -104,7 +104,7 @@ def planted(
     """
     values = dimensions_of(SPECIMEN).values | {"contact.friction": FRICTION}
     drive = rig.path(cycles, 80, amplitudes)
-    size = GROSS / WIDTH
+    size = GROSS
     if control == "displacement":
         force, displacement = planted((0.9,), 1, "force")
         size = float(np.max(displacement))
@@ -113,7 +113,7 @@ def planted(
     )
     history = jb.solve(scene, size * drive[1:])
     first = history.pressed + 1
-    force = np.append(0.0, np.asarray(history.force)[first:]) * WIDTH
+    force = np.append(0.0, np.asarray(history.force)[first:])
     return force, np.append(0.0, np.asarray(history.displacement)[first:])
 
 

@@ -79,23 +79,25 @@ def scene_of(options: argparse.Namespace) -> Scene:
         OWN,
         check_load,
         check_specimen,
-        check_width,
+        check_standard,
         specimen_of,
         with_units,
     )
     from jbeamshell.scene import library
     from jbeamshell.scene.dimensions import KEYS
     from jbeamshell.scene.toml import entry_note, overridden, scene_from_values
+    from jbeamshell.scene.width import check_width
 
     below = {} if options.scene is None else library.values_from(options.scene)
     known = specimen_of(options)
-    notes, own = known.notes, set(known.totals) <= {KEYS[name] for name in OWN}
-    both = overridden(below, known.totals)
+    notes, own = known.notes, set(known.values) <= {KEYS[name] for name in OWN}
+    both = overridden(below, known.values)
     assigned = assignments(options.set)
     wide = below.get("strip.width", known.width)
     assigned = with_units(assigned, both, wide)
     values = overridden(both, assigned)
-    check_width(str(options.scene), below, known.totals | assigned)
+    check_standard(below, known.values | assigned)
+    check_width(str(options.scene), below, known.values | assigned)
     if not own:
         check_specimen(values)
     scene = scene_from_values(values)

@@ -33,8 +33,6 @@ PART = 0.5  # part of gross slip of an amplitude that is proposed
 def add_dimensions(parser: argparse.ArgumentParser, *, lap: bool = False) -> None:
     """Add the options to a parser; ``lap`` adds those of a lap joint and its load."""
     words = "dimensions with units; the scene is then in SI, and forces are totals of the width"
-    if not lap:
-        words = "dimensions with units; the scene is then in SI, forces per metre of width"
     group = parser.add_argument_group("specimen", words)
     for name, (_, example, text) in (ALL if lap else DIMENSIONS).items():
         option = f"--{name.replace('_', '-')}"
@@ -45,10 +43,12 @@ def add_dimensions(parser: argparse.ArgumentParser, *, lap: bool = False) -> Non
 
 
 def dimensions(options: argparse.Namespace) -> dict[str, Any]:
-    """Entries ``dimensions`` and ``width`` of a specimen's table, as far as they are given."""
+    """Entries of a specimen's table: its dimensions, or a width alone in the data's own unit."""
+    from jbeamshell.scene.dimensions import KEYS
+
     given = _given(options, DIMENSIONS)
     if set(given) == {"width"}:
-        return {"width": width(given["width"])}
+        return {"set": {KEYS["width"]: _own("--width", given["width"], "width")}}
     return {"dimensions": given} if given else {}
 
 
@@ -60,11 +60,6 @@ def _given(options: argparse.Namespace, names: Mapping[str, Any]) -> dict[str, A
     return given | {
         name: text for name in names if (text := getattr(options, name, None)) is not None
     }
-
-
-def width(text: str) -> float:
-    """Width from an option: with a unit in metres, a number alone in the data's own unit."""
-    return _own("--width", text, "width")
 
 
 def _own(name: str, text: str, dimension: str) -> float:
@@ -136,28 +131,19 @@ def _in_si(key: str, text: str, values: Mapping[str, Any], width_of_all: float |
     return float(found[1]) * factor
 
 
-def check_width(where: str, below: Mapping[str, Any], given: Mapping[str, Any]) -> None:
-    """Raise `InputError` for a width given to a scene whose forces were said without one.
+def check_standard(below: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a width given to the standard strip, which is for one unit of width.
 
     Parameters
     ----------
-    where : name of the scene, or its file
-    below : values by dotted key of that scene
+    below : values by dotted key of the scene that was named
     given : values by dotted key that override them
     """
-    from jbeamshell.scene.keys import TOTALS, TWINS
-
-    if "strip.width" in below or given.get("strip.width") is None:
+    if given.get("strip.width") is None:
         return
     fix = "the standard strip is for one unit of width: give a scene, or a specimen's dimensions, "
     fix += "such as --length 120mm"
     require("--width", given["strip.width"], bool(below) or len(given) > len(OWN), fix)
-    for key in TOTALS:
-        if key in below and not {key, TWINS.get(key)} & set(given):
-            raise InputError(
-                f"{key} = {below[key]!r}: is per unit of width in {where}, and a total with "
-                "strip.width: give it too, or write strip.width and totals into the scene"
-            )
 
 
 def check_specimen(values: Mapping[str, Any]) -> None:

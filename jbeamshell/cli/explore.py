@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     check_installed()
     from jbeamshell.explorer.serve import serve
 
-    given = options.scene is not None or options.set or specimen_of(options).totals
+    given = options.scene is not None or options.set or specimen_of(options).values
     scene = scene_of(options) if given else None
     loops = read_loops(options.data) if options.data else []
     say("compiling ...")

@@ -6,9 +6,7 @@ import argparse
 from typing import Any
 
 from jbeamshell.cli.arguments import add_columns, add_folder, add_json, pairs
-from jbeamshell.cli.dimensions import width
 from jbeamshell.cli.terminal import BAD_INPUT, put, say_written
-from jbeamshell.scene.dimension_table import DIMENSIONS
 
 
 def add_to(commands: Any) -> None:
@@ -24,7 +22,6 @@ def add_to(commands: Any) -> None:
         "data", nargs="+", metavar="DATA", help="files (.csv, .txt, .mat, .npz, .h5, .tdms, .uff)"
     )
     add_columns(parser)
-    parser.add_argument("--width", metavar="50MM", help=DIMENSIONS["width"].text)
     add_folder(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -43,7 +40,6 @@ def run(options: argparse.Namespace) -> int:
         columns=pairs(options.column, "force=FT"),
         units=pairs(options.unit, "force=kN"),
         decimal=options.decimal,
-        width=1.0 if options.width is None else width(options.width),
     )
     figures = seen.figures()
     put(as_json(figures) if options.json else f"{seen}\n")

@@ -122,7 +122,7 @@ class Assembly(Model):
         scene : strip or lap joint
         mass, stiffness : (n, n) matrices without the joint
         joint : its two degrees of freedom; None is the ground
-        width : width of the strip
+        width : width of the strip, where its forces are for one unit of width
         damping_ratio : of all modes, besides that of the joint
         series_stiffness : stiffness of a spring in series with the joint; None is rigid
         reach : force up to which the joint is computed, over its gross slip; a moment is the
@@ -132,7 +132,7 @@ class Assembly(Model):
         Raises
         ------
         InputError
-            for matrices that are no square ones, or numbers out of bounds
+            for matrices that are no square ones, numbers out of bounds, or two widths
 
         Examples
         --------
@@ -146,6 +146,8 @@ class Assembly(Model):
         require(
             "joint", joint, pair, "give two degrees of freedom, or one that is held by the ground"
         )
+        fix = "the scene has a strip.width already: leave width out"
+        require("width", width, width == 1.0 or scene.strip.width is None, fix)
         first, second = (*joint, None)[:2]
         require("joint", joint, isinstance(first, int), "give a degree of freedom first")
         assert isinstance(first, int)

@@ -322,7 +322,7 @@ def planned(
         dimensions = one.known(folder)
         meant = said(one, dimensions.values, folder)
         keys = [parameter.key for parameter in parameters]
-        read = one.read(folder, meant.driver, keys, options.unchecked)
+        read = one.read(folder, meant.driver, keys, meant.width, options.unchecked)
         taken = [item for item, _ in read]
         model, parameters, chosen_for_it, doubted = meant.completed(taken, parameters)
         fix = "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS))

@@ -32,6 +32,7 @@ from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.mounting import in_words
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import overridden, scene_from_values
+from jbeamshell.scene.width import check_width
 
 KINDS = (
     "give a jbeamshell.Scene, values by dotted key, the name of a scene, a law such as "
@@ -60,9 +61,21 @@ class Completed(NamedTuple):
 
 
 class SaidStrip(NamedTuple):
-    """Strip of which some values are said, by dotted key."""
+    """Strip of which some values are said, by dotted key.
+
+    Attributes
+    ----------
+    values : values by dotted key
+    real : True where real dimensions are given, with their units
+    """
 
     values: Mapping[str, Any]
+    real: bool = False
+
+    @property
+    def width(self) -> float | None:
+        """Width of which forces are totals."""
+        return self.values.get("strip.width")
 
     @property
     def driver(self) -> str | None:
@@ -74,6 +87,10 @@ class SaidStrip(NamedTuple):
         """Strip whose other values the data tell; see `chosen_free` and `started`."""
         own, notes = dict(self.values), []
         loops = [item for item in data if isinstance(item, Loop)]
+        for loop in loops if self.real and self.width is None else ():
+            fix = "is a total, but the specimen has no width: give --width, such as 50mm, or a "
+            fix += "force per width, such as --unit force=N/mm"
+            require(f"{loop.label}: force", "[N]", loop.unit("force") != "N", fix)
         if "load.control" not in own and loops:
             driver = own["load.control"] = driver_of(loops)
             notes.append(f"the {driver} drives these loops (set load.control to change it)")
@@ -107,6 +124,7 @@ class SaidLaw(NamedTuple):
 
     law: Law | type[Law]
     values: Mapping[str, Any]
+    width: None = None  # its forces are those of the data
 
     @property
     def driver(self) -> str | None:
@@ -134,6 +152,13 @@ class SaidModel(NamedTuple):
     model: Model
 
     @property
+    def width(self) -> float | None:
+        """Width of which forces are totals."""
+        scene = getattr(self.model, "scene", None)
+        width = None if scene is None else scene.strip.width
+        return None if width is None else float(width)
+
+    @property
     def driver(self) -> str | None:
         """Column that drives it."""
         return self.model.control if self.model.control in CONTROLS else None
@@ -157,11 +182,12 @@ def said(
     Raises
     ------
     InputError
-        if its scene is none of the kinds that a fit knows
+        if its scene is none of the kinds that a fit knows, or has forces for one unit of width
+        where there is a width
     """
     given, own = specimen.scene, specimen.of_model
     if isinstance(given, str) and (given in LAWS or given.startswith("sliders")):
-        return SaidLaw(law_named(given), own)
+        return SaidLaw(law_named(given), _of_law(own))
     if isinstance(given, str):
         of_file = given.endswith(".toml") or os.path.isfile(folder / given)
         fix = f"choose a law ({', '.join(LAWS)}), a scene ({', '.join(library.NAMES)}), or a file"
@@ -172,12 +198,13 @@ def said(
     elif isinstance(given, Scene):
         given = StripModel(given)
     if isinstance(given, Mapping):
-        return SaidStrip(overridden(overridden(given, dimensions), own))
+        check_width("the scene", given, {**dimensions, **own})
+        return SaidStrip(overridden(overridden(given, dimensions), own), bool(dimensions))
     if isinstance(given, Model):
         of_strip = dimensions if isinstance(given, StripModel) else {}
         return SaidModel(given.replace(overridden(of_strip, own)))
     require("scene", given, isinstance(given, Law), KINDS)
-    return SaidLaw(given, own)
+    return SaidLaw(given, _of_law(own))
 
 
 def driven(
@@ -228,6 +255,11 @@ def _figures(measurements: Sequence[Any], control: str) -> tuple[float, float, f
     force, displacement = (size, size / secant) if control == "force" else (size * secant, size)
     stiffness = 1.5 * max(float(most), secant)
     return force, displacement, work or 4.0 / 3.0 * force * displacement, stiffness
+
+
+def _of_law(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of a law, which has no width."""
+    return {key: value for key, value in values.items() if key != "strip.width"}
 
 
 def _starts(free: Free) -> dict[str, float]:

@@ -15,7 +15,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml
 from jbeamshell.identify.models import Model, StripModel, as_model
-from jbeamshell.identify.parameters import PREFIX, check_rig, is_number
+from jbeamshell.identify.parameters import PREFIX, check_rig
 from jbeamshell.measured.columns import QUANTITIES
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import KINDS, Backbone
@@ -30,7 +30,6 @@ from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
-from jbeamshell.scene.scene import Scene
 
 CYCLES = ("auto", "steady", "recorded")
 WRONG_DRIVE = (
@@ -83,8 +82,6 @@ class Specimen:
     centre : True to take the zeros of the sensors from the loops, see `Loop.centred`; None to do so
         where they can only be offsets
     reverse : "force" or "displacement" to turn the sign of that column
-    width : width of the specimen, by which forces that were read from a file are divided; those of
-        arrays and of mean loops are per width already, see `Loop.per_width`
     columns, units, decimal : arguments of `read_loops`
     dimensions : dimensions of the specimen with units, see `jbeamshell.scene.dimension_table`; or
         the name of a TOML file that holds them
@@ -106,7 +103,6 @@ class Specimen:
     drift: str = "keep"
     centre: bool | None = None
     reverse: str | None = None
-    width: float = 1.0
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
     decimal: str | None = None
@@ -120,8 +116,6 @@ class Specimen:
             valid = (value is None or isinstance(value, str)) and value in known
             require(name, value, valid, f"choose among {', '.join(repr(w) for w in known if w)}")
         require("centre", self.centre, self.centre in (None, True, False), "give true or false")
-        positive = is_number(self.width) and self.width > 0.0
-        require("width", self.width, positive, "give a positive number")
         require("set", self.set, isinstance(self.set, Mapping), "give values by dotted key")
         check_rig(self.rig)
 
@@ -161,20 +155,18 @@ class Specimen:
         given = self.dimensions
         read = read_toml(folder / given) if isinstance(given, str) else given
         try:
-            known = dimensions_of(read)
+            return dimensions_of(read)
         except InputError as error:
             raise InputError(
                 f"{given}: {error}" if isinstance(given, str) else str(error)
             ) from None
-        fix = "is given twice, as one of the dimensions too: leave it out here"
-        require("width", self.width, known.width is None or self.width == 1.0, fix)
-        return known
 
     def read(
         self,
         folder: Path,
         driver: str | None = None,
         free: Sequence[str] = (),
+        width: float | None = None,
         unchecked: bool = False,
     ) -> list[tuple[Measurement, Sequence[str]]]:
         """Measurements as they are fitted, each with notes on what was done to it.
@@ -186,6 +178,7 @@ class Specimen:
         folder : folder in which files are looked for
         driver : column that drives; None finds it
         free : keys to fit
+        width : width of the model, of which forces are totals; None is one unit of width
         unchecked : True to take a recording that an inspection refuses
 
         Raises
@@ -197,30 +190,25 @@ class Specimen:
         where = f" of specimen {self.label!r}" if self.label else ""
         if not items:
             raise InputError(f"data{where}: no measurement given: give loops, or files")
-        known = self.known(folder)
-        width = self.width if known.width is None else known.width
         named = [item for item in items if isinstance(item, str | os.PathLike)]
         if named:
             fix = "files do not mix with other data: make each a Specimen"
             require("data", str(named[0]), len(named) == len(items), fix)
             files = [folder / name for name in named]
             if self.kind not in ("loop", "backbone"):
-                fix = f"a {self.kind} curve is per unit width; leave width out"
-                require("width", width, width == 1.0, fix)
-                return list(read_curves(files, self.kind, **self._reading))
+                return list(read_curves(files, self.kind, width=width, **self._reading))
             items = list(read_loops(files, **self._reading))
         asked = self.driver or driver
         keeps_zero = bool(ZEROS & {*free, *self.set})
         found: list[tuple[Measurement, Sequence[str]]] = []
         for item in items:
             if isinstance(item, Loop) and item.titles is not None:
-                if known.values and item.units is None:
+                if self.dimensions and item.units is None:
                     raise InputError(
                         f"{item.label}: its columns name no units, but the specimen's dimensions "
                         "do: give --unit force=N --unit displacement=mm, or what they are"
                     )
-                self._check_width(item, width)
-                item = item.per_width(width)
+                item = item if width is None else item.of_width(width)
             if isinstance(item, Loop) and item.as_recorded:
                 found += self._of_recording(item, asked, keeps_zero, unchecked)
             elif isinstance(item, Loop):
@@ -228,19 +216,6 @@ class Specimen:
             else:
                 found.append((item, ()))
         return found
-
-    def _check_width(self, item: Loop, width: float) -> None:
-        """Refuse forces per width beside a scene with a width, whose forces are totals."""
-        given = self.scene
-        whole = given.get("strip.width") if isinstance(given, Scene | Mapping) else None
-        if whole is None and "strip.width" not in self.set:
-            return
-        fix = "divides forces, and the scene has a strip.width, with which they are totals: leave "
-        fix += "one of them out"
-        require("width", width, width == 1.0, fix)
-        per_width = [name for name, unit in (item.units or {}).items() if unit == "N/m"]
-        fix = "is per width, and the scene has a strip.width: leave strip.width out"
-        require(item.label, ", ".join(per_width), not per_width, fix)
 
     @property
     def _reading(self) -> dict[str, Any]:
@@ -320,7 +295,7 @@ def _forgets_zero(loop: Loop) -> bool:
 
 
 def plausible_stiffness(model: Model, free: Sequence[str]) -> tuple[float, float] | None:
-    """Least and largest force per width over displacement that a strip can have.
+    """Least and largest force over displacement that a strip can have.
 
     A strip that is held at its far end is at least as stiff as without friction, E'2H/L; a third of
     that leaves room for the rig.  Ten times E' is more than a strip that sticks under its load.
@@ -337,7 +312,8 @@ def plausible_stiffness(model: Model, free: Sequence[str]) -> tuple[float, float
     unknown = any(key.startswith(("strip.", PREFIX)) and key not in OF_SHEAR for key in free)
     if strip.axial_stiffness is None or unknown:
         return None
-    stretching, length = float(model.scene.get("strip.axial_stiffness")), float(strip.length)
+    stretching = float(strip.axial_stiffness * model.scene.wide)
+    length = float(strip.length)
     held = "v" in FAR_ENDS[strip.far_end]
     return stretching / (3.0 * length) * held, 10.0 * stretching / (
         length * float(strip.height_ratio)

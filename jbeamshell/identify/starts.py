@@ -157,7 +157,7 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         take("strip.far_end", "free")
     length = float(scene_from_values(values).strip.length)
     if found.normal is not None and found.normal > 0.0 and not _pressed(values):
-        take("contact.pressure", found.normal / length)
+        take("contact.pressure", found.normal / (length * float(scene.strip.width or 1.0)))
     scene = scene_from_values(values)
     _check_known(scene, values, found, forced)
     tall = any(key in values for key in HEIGHT) or scene.strip.layers is not None
@@ -167,15 +167,17 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
     if not tall and x is not None:
         take("strip.height_ratio", float(np.clip(2.0 * found.force / gross / x, *HEIGHTS)))
     if not stiff:
-        take("strip.axial_stiffness", _stretching(found, gross, length))
+        halves = float(scene.wide) / float(scene.strip.width or 1.0)
+        take("strip.axial_stiffness", _stretching(found, gross, length) / halves)
         if found.si and tall and "strip.length" in known:
             _check_modulus(float(scene_from_values(values).strip.plane_modulus))
     if found.soft and "contact.stick_stiffness" not in values:
         scene = scene_from_values(values)
-        sliders = gross / found.short / length * float(scene.strip.half_height)
+        sliders = gross / found.short / length / float(scene.wide) * float(scene.strip.half_height)
         take("contact.stick_stiffness", sliders / float(scene.strip.shear_modulus))
     if not _pressed(values):
-        take("contact.pressure", gross / (float(scene.contact.friction) * length))
+        pressing = gross / float(scene.contact.friction)
+        take("contact.pressure", pressing / (length * float(scene.wide)))
     elif "contact.friction" not in values:
         take("contact.friction", gross / _pressing(scene))
         _check_friction(values["contact.friction"], found, scene, values)
@@ -223,7 +225,7 @@ def _check_friction(
         units = TOO_SOFT if stiffness * UNIT_ERROR < soft else units
         units = TOO_STIFF if stiffness > UNIT_ERROR * stiff else units
     raise InputError(
-        f"contact.friction: the measured force, {found.peak:.4g} per width, is that of a friction "
+        f"contact.friction: the measured force, {found.peak:.4g}, is that of a friction "
         f"of {needed:.2g}, which no surface has: {units}, or are pressure, bolts or width wrong; "
         f"if all are right, start from it by --start contact.friction={needed:.2g}"
     )
@@ -324,7 +326,7 @@ def _gross_slip(found: Estimate, scene: Scene, values: Mapping[str, Any], forced
     stiff = "strip.axial_stiffness" in values or ("strip.youngs_modulus" in values and tall)
     if x is not None and stiff and scene.strip.axial_stiffness is not None:
         bar = force**2 * float(scene.strip.length) / (2.0 * found.displacement)
-        guess = _beyond_bar(x) * bar / float(scene.get("strip.axial_stiffness"))
+        guess = _beyond_bar(x) * bar / float(scene.strip.axial_stiffness * scene.wide)
     elif x is not None and tall:
         guess = 2.0 * force / (x * float(scene.strip.height_ratio))
     return float(np.clip(guess, least, force / LEAST))

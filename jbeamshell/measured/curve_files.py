@@ -22,12 +22,14 @@ def read_curves(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     decimal: str | None = None,
+    width: float | None = None,
 ) -> list[tuple[Curve, tuple[str, ...]]]:
     """Read curves of one kind from files of the formats that `read_loops` reads.
 
     Columns are found by their names, with units or without: "amplitude" and the kind, such as
-    "dissipation"; "x" and "stress"; or "frequency", "force" and "amplitude".  All forces but that
-    of a forced response are per width.  A column "noise" holds the standard deviation of the second
+    "dissipation"; "x" and "stress"; or "frequency", "force" and "amplitude".  Forces and works
+    are per unit of width, or totals where a width is given; the force of a forced response is a
+    total.  A column "noise" holds the standard deviation of the second
     column, in its unit.
 
     Parameters
@@ -37,6 +39,8 @@ def read_curves(
     columns : name of a column by quantity, such as {"stress": "sigma_y"}
     units : unit by quantity, such as {"x": "mm"}, which overrides the header
     decimal : decimal mark, "," or "."; None infers it from the numbers
+    width : width [m] of the specimen, of which forces and works are totals; what is per width by
+        its unit is taken times it
 
     Returns
     -------
@@ -57,7 +61,7 @@ def read_curves(
                 raise InputError(f"{name}: {quantity!r} is no quantity: choose among {known}")
     files: list[Any] = list(paths) if isinstance(paths, list | tuple) else [paths]
     return [
-        _read(path, label, kind, columns or {}, units or {}, decimal)
+        _read(path, label, kind, columns or {}, units or {}, decimal, width)
         for path, label in zip(files, labels_of(files), strict=True)
     ]
 
@@ -69,6 +73,7 @@ def _read(
     chosen: Mapping[str, str],
     given: Mapping[str, str],
     decimal: str | None,
+    width: float | None,
 ) -> tuple[Curve, tuple[str, ...]]:
     curve: Any = CURVES[kind]
     wanted = {name: column.units for name, column in curve.form.columns.items()}
@@ -98,7 +103,8 @@ def _read(
         [found[quantity] for quantity in wanted], [found[q] for q in found if q == "noise"]
     )
     titles = {quantity: table.titles[place] for quantity, place in found.items()}
-    factors = _factors(wanted, titles, below, given, table.name)
+    totals = {} if width is None else {q: c.totals for q, c in curve.form.columns.items()}
+    factors = _factors(wanted, totals, width or 1.0, titles, below, given, table.name)
     whole = ~np.isnan(rows).any(axis=1)
     rows = rows[whole] * factors
     notes: tuple[str, ...] = ()
@@ -110,6 +116,8 @@ def _read(
 
 def _factors(
     wanted: Mapping[str, tuple[str, ...]],
+    totals: Mapping[str, tuple[str, ...]],
+    width: float,
     titles: Mapping[str, str],
     below: Mapping[str, Any],
     given: Mapping[str, str],
@@ -127,9 +135,14 @@ def _factors(
         )
     factors = {}
     for quantity, unit in units.items():
-        bases = wanted[second if quantity == "noise" else quantity]
+        base = second if quantity == "noise" else quantity
+        bases, whole = wanted[base], totals.get(base, ())
         unit = unit or (units[second] if quantity == "noise" else None)
-        factor = 1.0 if unit is None else factor_of(unit, bases)
+        factor = 1.0 if unit is None else factor_of(unit, whole or bases)
+        if factor is None and whole:
+            assert unit is not None
+            one = factor_of(unit, bases)
+            factor = None if one is None else one * width
         if factor is None:
             raise InputError(
                 f"{name}: column {titles[quantity]!r}: {str(unit)[:40]!r} is no unit of "

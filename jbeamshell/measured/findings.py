@@ -113,7 +113,7 @@ def of_levels(
     levels : cycles of each amplitude, by increasing amplitude
     found : all cycles of the recording
     before : findings about its columns
-    stiffness : least and largest plausible force per width over displacement, if known
+    stiffness : least and largest plausible force over displacement, if known
     """
     recording, findings = found.recording, list[Finding]()
     several, whole = len(levels) > 1, not any(finding.name == CLIPPED for finding in before)
@@ -226,7 +226,7 @@ def _of_stiffness(level: Level, band: tuple[float, float] | None) -> Finding | N
     fix = f"{TOO_SOFT if soft else TOO_STIFF}, or are --width or --modulus wrong"
     return Finding(
         "stiffness",
-        f"force over displacement, {level.stiffness:.3g} per width, is {factor:.3g} times "
+        f"force over displacement, {level.stiffness:.3g}, is {factor:.3g} times "
         f"{'below' if soft else 'above'} what the strip can have, {low:.3g} to {high:.3g}: {fix}",
         factor > UNIT_ERROR,
     )

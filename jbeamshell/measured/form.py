@@ -28,10 +28,12 @@ class Column(NamedTuple):
     label : label of an axis, with symbol and unit
     units : SI units to which a file's unit may be converted, forces per unit width; `NUMBER` for
         a pure number, whose column needs no unit
+    totals : the same units where forces are those of a whole width; empty if there are none
     """
 
     label: str
     units: tuple[str, ...]
+    totals: tuple[str, ...] = ()
 
 
 class Form(NamedTuple):
@@ -75,13 +77,13 @@ class Form(NamedTuple):
         return next(name for name in self.answers if name != control)
 
 
-FORCE = Column("$F$  [force/width]", ("N/m",))
+FORCE = Column("$F$  [force/width]", ("N/m",), ("N",))
 DISPLACEMENT = Column("$u(L)$  [length]", ("m",))
 POSITION = Column("$X$  [length]", ("m",))
 SQUEEZE_STRESS = Column(r"$\chi\,/\,2H$  [stress]", ("N/m^2",))
-AMPLITUDE = Column("amplitude of $F$ or $u(L)$  [force/width or length]", ("N/m", "m"))
-DISSIPATION = Column("$D$, work per cycle  [force]", ("J/m",))
-SECANT_STIFFNESS = Column("secant stiffness  [force/width/length]", ("N/m^2",))
+AMPLITUDE = Column("amplitude of $F$ or $u(L)$  [force/width or length]", ("N/m", "m"), ("N", "m"))
+DISSIPATION = Column("$D$, work per cycle  [force]", ("J/m",), ("J",))
+SECANT_STIFFNESS = Column("secant stiffness  [force/width/length]", ("N/m^2",), ("N/m",))
 FREQUENCY = Column("frequency  [1/time]", ("Hz",))
 DAMPING = Column(r"damping ratio $\zeta$", NUMBER)
 RESPONSE = Column("amplitude of $u$  [length]", ("m",))

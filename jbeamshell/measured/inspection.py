@@ -166,7 +166,6 @@ def inspect(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     decimal: str | None = None,
-    width: float = 1.0,
     stiffness: tuple[float, float] | None = None,
 ) -> Inspection:
     """Inspect measured data before a fit: what they hold, and what speaks against them.
@@ -178,8 +177,7 @@ def inspect(
     ----------
     data : a loop, one file or several, or a list
     columns, units, decimal : how files are read, see `jbeamshell.measured.read_loops`
-    width : width of the specimen, by which forces are divided
-    stiffness : least and largest plausible force per width over displacement, if known
+    stiffness : least and largest plausible force over displacement, if known
 
     Returns
     -------
@@ -207,11 +205,10 @@ def inspect(
     else:
         paths: FilePath | Sequence[FilePath] = data  # type: ignore[assignment]
         items = list(read_loops(paths, columns=columns, units=units, decimal=decimal))
-    return Inspection(tuple(_view(item, width, stiffness) for item in items))
+    return Inspection(tuple(_view(item, stiffness) for item in items))
 
 
-def _view(given: Loop, width: float, stiffness: tuple[float, float] | None) -> View:
-    recording = given.per_width(width)
+def _view(recording: Loop, stiffness: tuple[float, float] | None) -> View:
     findings = of_columns(recording)
     try:
         found = split_cycles(recording)
@@ -219,7 +216,7 @@ def _view(given: Loop, width: float, stiffness: tuple[float, float] | None) -> V
         reason = str(error).removeprefix(f"{recording.label}: ")
         return View(recording, None, (), (*findings, *of_loading(recording)), reason)
     levels = tuple(
-        Level(loop, len(found.group(number)), shape_of(found, number, given.cycles))
+        Level(loop, len(found.group(number)), shape_of(found, number, recording.cycles))
         for number, loop in enumerate(steady_loops(recording, found.driver))
     )
     findings += of_levels(levels, found, findings, stiffness)

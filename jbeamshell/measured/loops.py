@@ -35,7 +35,8 @@ class Loop(Measurement):
 
     Attributes
     ----------
-    force : (points,) end force, per unit width in a fit [N or N/m, or the Scene's own unit]
+    force : (points,) end force, a total or per unit of width as the scene has it [N, N/m, or the
+        scene's own unit]
     displacement : (points,) displacement of the loaded end [m, or the Scene's own unit]
     label, weight : see `Measurement`
     time : (points,) time [s], or None
@@ -130,24 +131,21 @@ class Loop(Measurement):
         mean = float(np.mean(self.normal_force[first:last]))
         return mean if np.isfinite(mean) else None
 
-    def per_width(self, width: float) -> Loop:
-        """Loop of forces per unit width; those that are so by their unit stay as they are."""
-        if width == 1.0:
-            return self
+    def of_width(self, width: float) -> Loop:
+        """Loop of the forces of a whole width [m]; those that are so by their unit stay."""
         units, columns, notes = dict(self.units or {}), dict[str, Any](), list(self.notes)
         for name in ("force", "normal_force"):
-            if units.get(name) == "N/m":
-                told = f"the {name} is per width already, so the width does not divide it"
-                notes += [told] * (getattr(self, name) is not None)
+            if units.get(name) != "N/m" or getattr(self, name) is None:
                 continue
+            notes.append(f"the {name} is per width, and is taken times the width of {width:g} m")
             own_noise = (
                 ["drive_noise", "drive_error"] if self.driver == "force" else ["noise", "scatter"]
             )
             of_force = own_noise if name == "force" else []
             for own in (name, *of_force):
                 if (value := getattr(self, own)) is not None:
-                    columns[own] = value / width
-            units |= {name: "N/m"} if name in units else {}
+                    columns[own] = value * width
+            units[name] = "N"
         return self.but(**columns, notes=tuple(notes), units=self.units and units)
 
     @property

@@ -23,6 +23,7 @@ from jbeamshell.plotting.style import (
     panels,
     style,
 )
+from jbeamshell.scene.scene import Scene
 
 PER_CENT = "(model - data) / range  [%]"
 LOG_PER_CENT = r"$\ln$(model / data)  [%]"
@@ -63,7 +64,8 @@ def overlay(fit: Any, axes: Any = None) -> list[Axes]:
                     low, high = (_xy(form, end) for end in bands[place])
                     x, y = (np.append(a, b[::-1]) for a, b in zip(low, high, strict=True))
                     panel.fill(x, y, color=look["color"], alpha=0.2, linewidth=0.0)
-            panel.set(xlabel=form.columns[form.x].label, ylabel=form.columns[form.y].label)
+            along, up = (_label(fit, form.columns[name].label) for name in (form.x, form.y))
+            panel.set(xlabel=along, ylabel=up)
             panel.set(xscale=form.scale, yscale=form.scale)
             if form.scale == "log":
                 mark_decades(panel.xaxis, panel.yaxis)
@@ -99,13 +101,21 @@ def residuals(fit: Any, axes: Any = None) -> list[Axes]:
                 look = {"color": colour, "label": named, "markersize": 3.0}
                 panel.plot(getattr(data, along), 100.0 * left[place], mark, **look)
             panel.axhline(0.0, color=FAINT, linewidth=1.0, zorder=1.0)
-            panel.set(xlabel=form.columns[along].label, xscale=form.scale)
+            panel.set(xlabel=_label(fit, form.columns[along].label), xscale=form.scale)
             if form.scale == "log":
                 mark_decades(panel.xaxis)
             panel.set(ylabel=LOG_PER_CENT if form.scale == "log" else PER_CENT)
             if len(places) <= MOST_NAMED:
                 panel.legend(loc="best").set_in_layout(False)
     return [panel for _, _, panel in drawn]
+
+
+def _label(fit: Any, label: str) -> str:
+    """Label of a column, without the words for one unit of width where forces are totals."""
+    scenes = [own for own in fit.scenes.values() if isinstance(own, Scene)]
+    totals = any(scene.strip.width is not None for scene in scenes)
+    measured = any((getattr(data, "units", None) or {}).get("force") == "N" for data in fit.data)
+    return label.replace("/width", "") if totals or (measured and not scenes) else label
 
 
 def _name(places: Sequence[int], place: int, label: str) -> str:

@@ -44,13 +44,13 @@ class Dimensions(NamedTuple):
 
     Attributes
     ----------
-    totals : values of a scene by dotted key; forces are those of the whole width, if it is known
+    values : values of a scene by dotted key; forces are those of the whole width, if it is known
     notes : sentences on what was taken for granted
     bolts : bolts in words, a sentence for each kind
     scatter : half the range of the bolts' preloads over their mean
     """
 
-    totals: dict[str, Any]
+    values: dict[str, Any]
     notes: tuple[str, ...] = ()
     bolts: tuple[str, ...] = ()
     scatter: float = 0.0
@@ -58,21 +58,7 @@ class Dimensions(NamedTuple):
     @property
     def width(self) -> float | None:
         """Width [m], None if it is not known."""
-        return self.totals.get("strip.width")
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """Values of a scene by dotted key for one unit of width, one half of a double lap."""
-        found, width = dict(self.totals), self.width
-        if width is None:
-            return found
-        del found["strip.width"]
-        if "contact.bolts" in found:
-            found["contact.bolts"] = [[x, f / width, w] for x, f, w in found["contact.bolts"]]
-        if "load.amplitude" in found:
-            halves = 2.0 if found.get("member.support") == "rolling" else 1.0
-            found["load.amplitude"] /= width * halves
-        return found
+        return self.values.get("strip.width")
 
 
 def dimensions_of(texts: Mapping[str, Any]) -> Dimensions:

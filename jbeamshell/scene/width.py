@@ -17,7 +17,7 @@ from jax import Array
 
 from jbeamshell.common.checks import is_traced, shown
 from jbeamshell.common.errors import InputError
-from jbeamshell.scene.keys import DERIVED, LENGTHS, TABLE, TOTALS, WIDTH_OF_ALL, leaf_of
+from jbeamshell.scene.keys import DERIVED, LENGTHS, TABLE, TOTALS, TWINS, WIDTH_OF_ALL, leaf_of
 from jbeamshell.scene.parts import Contact, Load, Member, Strip
 
 
@@ -88,6 +88,30 @@ def per_width(scene: Parts, values: Mapping[str, Any]) -> dict[str, Any]:
             elif key != "contact.bolts":
                 found[key] = scene.get(key) / whole
     return found
+
+
+def check_width(where: str, below: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+    """Refuse a width for values of a scene whose forces were said without one.
+
+    Parameters
+    ----------
+    where : name of the scene, or its file
+    below : values by dotted key of that scene
+    given : values by dotted key that override them
+
+    Raises
+    ------
+    InputError
+        for a force that is given per unit of width only
+    """
+    if WIDTH_OF_ALL in below or given.get(WIDTH_OF_ALL) is None:
+        return
+    for key in TOTALS:
+        if key in below and not {key, TWINS.get(key)} & set(given):
+            raise InputError(
+                f"{key} = {shown(below[key])}: is per unit of width in {where}, and a total with "
+                "strip.width: give it too, or write strip.width and totals into the scene"
+            )
 
 
 def pressure_factor(scene: Parts, values: Mapping[str, Any]) -> Array | None:

@@ -59,7 +59,7 @@ class LapJoint:
     ) -> None:
         known = dimensions_of({"joint": joint, **dimensions})
         self.bolts, self.scatter, self.notes = known.bolts, known.scatter, known.notes
-        self.scene: Scene = Scene().replace(known.totals | (change or {}))
+        self.scene: Scene = Scene().replace(known.values | (change or {}))
 
     def solve(self, **options: Any) -> History:
         """History of its cycles; options are those of `jbeamshell.solve`."""

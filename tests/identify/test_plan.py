@@ -67,7 +67,7 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
         set = { "strip.height_ratio" = 0.05 }
         [[specimen]]
         data = ["cycles.csv"]
-        width = 2.0
+        set = { "strip.width" = 2.0 }
         """
     )
     plan = read_plan(folder / "plan.toml")
@@ -80,9 +80,9 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
     assert plan.free[1].each
     assert (plan.options.noise, plan.options.starts) == (0.01, 2)
     assert [loop.label for loop in thin.measurements] == ["loop.csv", "pull.csv"]
-    (loop,) = other.measurements  # six cycles are one, in N and m, per width
+    (loop,) = other.measurements  # six cycles are one, in N and m
     assert loop.cycles == 6
-    assert np.max(loop.force) == pytest.approx(0.5, rel=0.03)
+    assert np.max(loop.force) == pytest.approx(1.0, rel=0.03)
     assert other.model.control == "displacement"
     assert other.model.get("load.amplitude") == pytest.approx(1e-5, rel=0.01)
     assert any("mean of 6 of 6" in note for note in plan.notes)
@@ -99,8 +99,8 @@ def test_cycles_are_averaged_unless_told_otherwise(folder, cycles, points):
 
 def test_recordings_at_hand_are_read_as_files_are(folder):
     (recording,) = read_loops(folder / "cycles.csv")
-    ((loop, notes),) = Specimen(data=recording, width=2.0).read(folder)
-    ((other, others),) = Specimen(data="cycles.csv", width=2.0).read(folder)
+    ((loop, notes),) = Specimen(data=recording).read(folder)
+    ((other, others),) = Specimen(data="cycles.csv").read(folder)
     np.testing.assert_array_equal(loop.force, other.force)
     assert notes == others
     with pytest.raises(InputError, match="files do not mix with other data"):
@@ -171,8 +171,7 @@ def test_curves_that_cannot_be_read_say_why(tmp_path, text, message):
         ({"specimen": [{"label": "thin"}]}, "'thin': data = None: list its files"),
         ({"specimen": [{"data": "loop.csv"}]}, "data = 'loop.csv': list its files"),
         ({"specimen": [{"data": ["loop.csv"], "kind": "lop"}]}, "kind = 'lop': choose among"),
-        ({"specimen": [{"data": ["loop.csv"], "width": 0}]}, "width = 0: give a positive number"),
-        ({"specimen": [{"data": ["work.csv"], "kind": "dissipation", "width": 2.0}]}, "per unit"),
+        ({"specimen": [{"data": ["loop.csv"], "set": {"strip.width": 0}}]}, "strip.width = 0"),
         ({"specimen": [{"data": ["loop.csv"], "with": 1}]}, "'with' is unknown"),
         ({"specimen": [{"data": ["none.csv"]}]}, r"none\.csv: cannot be read"),
         ({"free": {"contact.friction": {"lo": 1}}}, "'lo' is unknown"),

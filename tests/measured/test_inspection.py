@@ -244,7 +244,7 @@ def test_a_recording_and_a_loop_are_printed_short_with_units(csv):
     assert "work of a cycle" in told
     assert "mJ" in told
     assert len(told) < 600
-    assert recording.per_width(0.05).unit("force") == "N/m"
+    assert recording.of_width(0.05).unit("force") == "N"
     bare = rig.recorded(rig.iwan(u), u)
     assert "without units" in str(bare)
 

@@ -34,15 +34,17 @@ def test_a_standard_error_is_that_of_a_mean():
     np.testing.assert_allclose(loop.standard_error, expected, rtol=1e-14)
 
 
-def test_noise_of_the_force_is_per_width_too():
+def test_forces_per_width_become_totals_with_their_noise():
     loop = Loop(
-        FORCE, DISPLACEMENT, noise=0.1, cycles=4, driver="displacement", units={"force": "N"}
+        FORCE, DISPLACEMENT, noise=0.1, cycles=4, driver="displacement", units={"force": "N/m"}
     )
-    wide = loop.per_width(0.5)
+    wide = loop.of_width(2.0)
     np.testing.assert_allclose(wide.force, 2.0 * FORCE)
     np.testing.assert_allclose(wide.deviations, 0.1)
-    assert wide.unit("force") == "N/m"
-    assert loop.but(driver="force").per_width(0.5).noise == 0.1
+    assert wide.noise == 0.2
+    assert wide.unit("force") == "N"
+    assert loop.but(driver="force").of_width(2.0).noise == 0.1
+    np.testing.assert_array_equal(wide.of_width(2.0).force, wide.force)  # a total by now
 
 
 def test_closed_loops_and_pulls():

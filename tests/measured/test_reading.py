@@ -242,12 +242,12 @@ def test_columns_of_a_table_without_a_header_have_numbers(read, delimiter, decim
             read(content, columns={"force": "2", "displacement": "4"})
 
 
-def test_forces_per_width_are_not_divided_again(tmp_path):
+def test_forces_per_width_are_totals_of_a_width(tmp_path):
     (tmp_path / "data.csv").write_text(text(["force [N/mm]", "displacement [mm]"]))
     (recording,) = read_loops(tmp_path / "data.csv")
-    again = recording.per_width(0.05)
-    np.testing.assert_array_equal(again.force, recording.force)
-    assert "the force is per width already, so the width does not divide it" in again.notes
+    whole = recording.of_width(0.05)
+    np.testing.assert_array_equal(whole.force, 0.05 * recording.force)
+    assert "the force is per width, and is taken times the width of 0.05 m" in whole.notes
 
 
 def test_several_loops_in_one_table(read):
