@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from sphinx.search.en import SearchEnglish
 
 import jbeamshell as jb
 from jbeamshell.cli.main import _parser
@@ -86,6 +87,43 @@ def test_code_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path):
     assert done.returncode == 0, done.stderr[-3000:]
     for said, shown in zip(json.loads(done.stdout.splitlines()[-1]), texts, strict=True):
         assert shown is None or alike(said, shown), said
+
+
+QUESTIONS = """
+compute the energy dissipated per cycle from the area of a hysteresis loop
+equivalent viscous damping ratio from a hysteresis loop
+loss factor of a bolted joint
+fit Bouc-Wen parameters to measured hysteresis data
+fit a four-parameter Iwan model to energy dissipation by a power law
+hysteresis loop of a joint in CalculiX: energy dissipated by friction
+how does bolt preload change natural frequency and damping
+preload of a bolt from its tightening torque
+is my parameter identifiable from the loop
+gradient of a contact simulation with friction by automatic differentiation
+pinching and stiffness degradation in a hysteresis model
+backlash or clearance in a measured loop
+Rayleigh damping and friction damping in one structure
+friction coefficient from a measured force displacement loop
+amplitude dependent frequency and damping of a jointed structure
+why does the hysteresis loop not close
+harmonic balance with friction contact elements
+export a joint to Abaqus as a connector
+mesh size for micro-slip in finite elements
+vmap many parameters in parallel on GPU or cores
+"""
+SITE_SEARCH = SearchEnglish({})
+
+
+def stems(text):
+    """Stems of a text's words, as the site's search has them."""
+    words = [word.lower() for word in SITE_SEARCH.split(text)]
+    return {SITE_SEARCH.stem(word) for word in words if word not in SITE_SEARCH.stopwords}
+
+
+@pytest.mark.parametrize("question", QUESTIONS.strip().splitlines())
+def test_questions_that_people_ask_find_a_page(question):
+    # The site's search finds pages that hold every word of a question.
+    assert any(stems(question) <= stems(page.read_text("utf-8")) for page in PAGES)
 
 
 def test_command_lines_of_pages_are_understood():
