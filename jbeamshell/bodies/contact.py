@@ -33,12 +33,14 @@ from jbeamshell.common.checks import as_leaf, is_traced, require, require_choice
 from jbeamshell.common.errors import Status, UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.numbers_of import numbers_of
+from jbeamshell.common.progress import patience
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS
 from jbeamshell.scene.parts import unit_path
 
 
+@patience("solving the contact")
 def solve_contact(
     upper: Substructure,
     lower: Substructure | None = None,

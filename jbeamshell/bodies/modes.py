@@ -31,6 +31,7 @@ from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.common.checks import as_leaf, is_traced, require, require_count
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.files import as_json, csv_text
+from jbeamshell.common.progress import patience
 from jbeamshell.common.summary import Summary, ranged
 
 RIGID = 1e-7  # eigenvalue over the largest one found, below which a mode is a rigid motion
@@ -219,6 +220,7 @@ class FaceCurve(eqx.Module):
         return write_folder(check_folder(folder), texts, picture)
 
 
+@patience("following the mode")
 def face_curve(
     bodies: ModalBodies,
     amplitudes: ArrayLike | None = None,

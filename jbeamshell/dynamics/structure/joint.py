@@ -31,6 +31,7 @@ from jbeamshell.common.checks import (
 )
 from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.progress import patience
 from jbeamshell.common.summary import Summary, with_unit
 from jbeamshell.dynamics.export import table
 from jbeamshell.dynamics.export.element import Element
@@ -113,6 +114,7 @@ class Joint(ParallelIwan):
         require("joint.forces", f, rising and softening and slopes[0] > 0.0, BACKBONE)
 
     @classmethod
+    @patience("finding the joint")
     def of(cls, scene: Scene | Law, force: Any = None) -> Joint:
         """Joint whose loops are nearest to the steady cycles of a scene, or those of a law.
 
