@@ -19,6 +19,7 @@ from jbeamshell.identify.models import LawModel, Model
 from jbeamshell.identify.observations import ModalObservation
 from jbeamshell.identify.parameters import Coordinate
 from jbeamshell.identify.problem import Problem
+from jbeamshell.identify.search import ROUNDING
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.starts import FRICTIONS, STIFFNESS
 from jbeamshell.identify.uncertainty import Uncertainty, independent_points, white_noise
@@ -91,7 +92,8 @@ def doubts_of(
             f"what the model leaves is correlated along the curve: the errors count {rows} points "
             f"as {uncertainty.independent:.2g} independent ones"
         )
-    others = [cost for cost in minima if cost > 1.01 * minima[0]]
+    rounding = rows * ROUNDING**2
+    others = [cost for cost in minima if cost > 1.01 * minima[0] + rounding]
     if others:
         doubts.append(
             f"{len(others)} of {len(minima)} starts ended in worse minima (cost {others[0]:.4g} or "

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.identify.parameters import ON_BOUND
@@ -24,6 +24,8 @@ from jbeamshell.identify.search_space import SearchSpace
 FLAT = 1e-6  # relative gain in cost below which a search has converged
 NEAR = 1e-10  # the same of a search on a bound, which begins near its end
 GRADIENT = 1e-10  # slope of the cost below which a search has converged, as where nothing is left
+PROMISED = 0.02  # part of the cost that a step still promises, from which on none has converged
+ROUNDING = 1e-6  # residual of a point that is rounding
 SCREENED = 4  # random points tried for each start besides the given one
 NO_INFLUENCE = 1e-9  # change of a residual for a unit step below which it is rounding
 
@@ -65,7 +67,8 @@ class SearchResult(NamedTuple):
     Attributes
     ----------
     point : (n,) coordinates
-    converged : False if it ran out of iterations, or could not begin
+    converged : False if it ran out of iterations, could not begin, or stopped where a step still
+        promises a lower cost
     """
 
     point: Vector
@@ -131,7 +134,20 @@ def minimise(
         gtol=GRADIENT,
         max_nfev=most,
     )
-    return SearchResult(whole(found.x), found.status > 0)
+    point = whole(found.x)
+    return SearchResult(point, found.status > 0 and not _promises(evaluate(point), moved))
+
+
+def _promises(at: Evaluation, moved: NDArray[np.intp]) -> bool:
+    """True if a step of one unit along each axis at most would lower the cost by much.
+
+    A search between points without equilibrium shrinks its steps until they look converged.
+    """
+    before = float(at.residual @ at.residual)
+    if before <= at.residual.size * ROUNDING**2:
+        return False
+    after = lsq_linear(at.jacobian[:, moved], -at.residual, (-1.0, 1.0)).cost
+    return bool(2.0 * after < (1.0 - PROMISED) * before)
 
 
 def search(
