@@ -227,7 +227,7 @@ class Bolt:
         Examples
         --------
         >>> Bolt("M8", torque="25 N m").rows([30.0, 70.0]).round(1).tolist()
-        [[30.0, 19006.3, 12.7], [70.0, 19006.3, 12.7]]
+        [[30.0, 19006.3, 14.7], [70.0, 19006.3, 14.7]]
         """
         require("unit", unit, unit in ("mm", "m"), "choose 'mm' or 'm'")
         width = self.patch * (1.0 if unit == "mm" else 1e-3)
@@ -256,17 +256,13 @@ class Bolt:
 def patch_width(head: float, hole: float) -> float:
     """Width of the even patch that stands for the ring under a round head, of the same unit.
 
-    The ring of the diameters d_w and d_h presses along X as its chords are long.  The patch has the
-    same second moment about its middle: w^2/12 = (d_w^2 + d_h^2)/16.  It acts on the outer face,
-    where the head is; plane elasticity spreads the pressure through the plate by itself, so that
-    no cone is added.
-
-    Beside a single lap in three dimensions with two such rings (60 x 30 mm, plates of 8 mm, 24 x 12
-    x 2 bricks with incompatible modes on each side of the lap) it loses 3 % less at .3 of gross
-    slip and 11 % less at .6, and its secant stiffness is within .4 %.  A patch as wide as a cone of
-    30 degrees loses 25 and 21 % more, and is 4 to 5 % stiffer.
+    It is (d_w^2 + d_h^2)^(1/2) of the diameters of head and hole, and acts on the outer face, where
+    the head is: plane elasticity spreads the pressure through the plate by itself, so that no cone
+    is added.  The ring alone would have the same second moment along X on .87 of that.  The rest is
+    fitted to single laps in three dimensions, where the pressure spreads across too
+    (`calibration/finite_elements/bolt_patch.py`, which has the errors).
     """
-    return math.sqrt(0.75 * (head**2 + hole**2))
+    return math.hypot(head, hole)
 
 
 def _length(name: str, given: Any, usual: float) -> float:

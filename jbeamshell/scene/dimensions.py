@@ -21,6 +21,7 @@ from jbeamshell.scene.dimension_table import ALL
 from jbeamshell.scene.quantities import quantity
 
 PROOF = 0.75  # usual part of the proof load, by which the head of a preload is guessed
+SPREAD = 3.0  # patches across that a bolt clamps, beyond which force does not spread evenly
 ROUNDING = 1e-9  # part of the length within which two ends of patches are one
 
 KEYS = {
@@ -146,6 +147,7 @@ def _bolted(
         fix = f"their pressure needs {name}: give it, such as {name} = {ALL[name].example}"
         require("bolts", text, name in sizes, fix)
     length, notes, words, patches = sizes["length"], [], [], []
+    rows: list[tuple[str, float, float]] = []
     scatter = 0.0
     kinds = text if isinstance(text, list | tuple) else str(text).split(";")
     for kind in kinds:
@@ -172,11 +174,13 @@ def _bolted(
                     f"bolts {kind}: a head of {1e3 * head:.3g} mm is taken, that of the smallest "
                     "8.8 bolt for this preload: give head to change it"
                 )
+        rows += [(kind.strip(), place, patch) for place in places]
         for place in places:
             fix = f"X = {1e3 * place:.6g} mm lies off the strip of {1e3 * length:.6g} mm"
             require("bolts", kind, place <= length, fix)
             low, high = max(place - 0.5 * patch, 0.0), min(place + 0.5 * patch, length)
             patches.append((low, high, force / (high - low)))
+    notes += _too_wide(rows, sizes["width"])
     totals = totals | {"contact.bolts": _apart(patches, length)}
     return Dimensions(totals, tuple(notes), tuple(words), scatter)
 
@@ -202,6 +206,23 @@ def _check_hole(kind: str, bolt: Bolt, width: float) -> None:
     """Refuse a hole that is as wide as the plate."""
     fix = f"its hole of {bolt.holed:g} mm leaves nothing of a plate {1e3 * width:g} mm wide: "
     require("bolts", kind, bolt.holed < 999.999 * width, f"{fix}take a smaller bolt, or give width")
+
+
+def _too_wide(rows: list[tuple[str, float, float]], width: float) -> list[str]:
+    """Sentence on plates that are wider than their bolts clamp; none where they are not.
+
+    Beside finite elements, see `calibration/finite_elements/bolt_patch.py`.
+    """
+    for kind, place, patch in rows:
+        beside = sum(abs(other - place) < 0.5 * patch for _, other, _ in rows)
+        if width > SPREAD * patch * beside:
+            return [
+                f"doubtful: {kind}: {beside} side by side at X = {1e3 * place:g} mm clamp some "
+                f"{1e3 * SPREAD * patch * beside:.0f} mm of plates {1e3 * width:g} mm wide, over "
+                "which the plane model spreads force and pressure evenly: the joint is softer, and "
+                "may lose half as much again"
+            ]
+    return []
 
 
 def _scatter(sizes: Mapping[str, float], usual: float) -> float:

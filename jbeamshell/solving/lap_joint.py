@@ -42,7 +42,7 @@ class LapJoint:
     ...     "single-lap",
     ...     length="100 mm",
     ...     thickness="8 mm",
-    ...     width="60 mm",
+    ...     width="30 mm",
     ...     modulus="210 GPa",
     ...     overhang="100 mm",
     ...     bolts="2xM8@30mm,70mm",

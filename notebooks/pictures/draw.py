@@ -222,7 +222,7 @@ def first_results() -> None:
 def bolted_joint() -> None:
     """Bolted lap joint of the page "A drawing and no test"."""
     jax.config.update("jax_enable_x64", True)
-    plates = {"length": "100 mm", "thickness": "8 mm", "width": "60 mm", "overhang": "100 mm"}
+    plates = {"length": "100 mm", "thickness": "8 mm", "width": "30 mm", "overhang": "100 mm"}
     bolts = {"bolts": "2xM8@30mm,70mm", "torque": "25 N m", "friction": 0.2, "force": "4 kN"}
     joint = jb.LapJoint("single-lap", modulus="210 GPa", **plates, **bolts)
     with warnings.catch_warnings():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.scene.bolts import PROOF, SIZES, patch_width
+from jbeamshell.scene.bolts import PROOF, SIZES
 
 # Size, friction, preload [kN] and torque [N m] of class 8.8 at 90 % of its yield point, as VDI 2230
 # (2001, 2003) tabulates them with three digits.
@@ -49,15 +49,7 @@ def test_stress_areas_rise_and_heads_cover_holes(diameter):
     size = SIZES[diameter]
     assert diameter < size.hole < size.head < 2.0 * diameter
     assert 0.55 < bolt.stress_area / (0.25 * math.pi * diameter**2) < 0.85
-    assert bolt.bearing < bolt.patch < 1.2 * bolt.bearing
-
-
-def test_a_patch_has_the_second_moment_of_its_ring():
-    outer, inner = 11.63, 9.0
-    random = np.random.default_rng(0)
-    radius = np.sqrt(random.uniform(inner**2, outer**2, 400_000)) / 2.0
-    x = radius * np.cos(random.uniform(0.0, 2.0 * np.pi, radius.size))
-    assert np.var(x) == pytest.approx(patch_width(outer, inner) ** 2 / 12.0, rel=0.01)
+    assert bolt.bearing < bolt.patch < 1.4 * bolt.bearing
 
 
 def test_rows_press_a_scene_with_their_force():
