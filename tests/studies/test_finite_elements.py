@@ -12,8 +12,9 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from calibration.finite_elements import sides
+from calibration.finite_elements import bolt_patch, sides
 from jbeamshell.measured.example import data_folder, example_loops
+from jbeamshell.scene.dimensions import SPREAD
 
 # Dissipation over that of finite elements by section: eta, then A = .3247, .5851, 1.0, 1.6, from an
 # independent prototype with 40 steps per half cycle, 82 to 95 nodes and alpha = 1000.
@@ -43,6 +44,16 @@ def test_a_strip_of_three_dimensions_is_in_plane_strain_or_plane_stress():
         found = sides.plane(kind, row["load"])
         assert float(found.dissipation) == pytest.approx(row["dissipation"], rel=0.01)
         assert float(found.secant_stiffness) == pytest.approx(row["secant_stiffness"], rel=0.03)
+
+
+def test_a_bolted_lap_of_three_dimensions_is_that_of_the_plane_where_bolts_clamp_its_width():
+    for row in json.loads(bolt_patch.RECORD.read_text())["rows"]:
+        energy, stiffness = bolt_patch.beside(row)
+        if row["width"] > SPREAD * bolt_patch.BOLT.patch:
+            assert stiffness > 0.08  # which is doubted
+        else:
+            assert abs(energy) < 0.12
+            assert abs(stiffness) < 0.03
 
 
 def reference() -> dict[tuple[float, float], float]:
