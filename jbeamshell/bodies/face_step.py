@@ -6,8 +6,9 @@ and lambda the force of the contact law (`face_law.contact_force`),
     K u - f P - B' lambda(B u) = 0.
 
 It has kinks and no other nonlinearity, so that Newton's method ends after a few iterations; a step
-that does not lower the residual is shortened.  Where the displacement of the load is prescribed, P
-follows from it, d = f' u + c P.
+that does not lower the residual is shortened.  Where that goes on and on, as on strongly coupled
+faces of much friction, sweeps with the stiffness of sticking points lead elsewhere.  Where the
+displacement of the load is prescribed, P follows from it, d = f' u + c P.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ from jax import Array, lax
 from jbeamshell.bodies.face_law import Points, contact_force
 
 TOLERANCE = 1e-11  # force out of balance over the largest load of a node
-ITERATIONS = 40
+ITERATIONS = 80
+ROUND = 20  # iterations after which Newton's method starts anew, from where sweeps have led
+SWEEPS = 400
 SHORTER = 0.5 ** np.arange(1.0, 7.0)  # lengths that are tried where a whole Newton step fails
 PARTS = np.array([1, 2, 3, 4, 6, 8]) / 16  # of the face, on which points slide or open
 LEAST = 24  # displacements, below which a part is not worth its program
@@ -247,7 +250,17 @@ def _newton(
 
         falls = jnp.sum(at_whole**2) < (1.0 - 1e-4) * before
         u, off = lax.cond(falls, lambda: (whole, at_whole), shortened)
+        u, off = lax.cond((count + 1) % ROUND == 0, swept, lambda u: (u, off), u)
         return u, off, count + 1
+
+    def swept(u: Array) -> tuple[Array, Array]:
+        pull = face.loads[:, 0]
+
+        def sweep(_: int, u: Array) -> Array:
+            return u + sticking.moved(-residual(u), drive.driven, pull)
+
+        u = lax.fori_loop(0, SWEEPS, sweep, u)
+        return u, residual(u)
 
     def goes_on(state: tuple[Array, Array, Array]) -> Array:
         u, off, count = state

@@ -11,6 +11,7 @@ import jbeamshell as jb
 from calibration.finite_elements import body as calculix
 from calibration.finite_elements.block import LOAD
 from calibration.finite_elements.bricks import SOFTNESS, area
+from jbeamshell.bodies.face_step import ROUND
 from jbeamshell.bodies.substructure import frames_of
 from jbeamshell.measured.example import data_folder
 
@@ -263,6 +264,31 @@ class TestRefusals:
             DAMAGES[draw.choice(list(DAMAGES))](draw, arrays)
             with pytest.raises(jb.InputError, match=" = "):
                 jb.Substructure(**arrays)
+
+
+def test_sweeps_lead_on_where_newtons_method_goes_in_circles():
+    # Six pairs that are strongly coupled, normals all round, and mu near 1.
+    draw = np.random.default_rng(35)
+    places = np.column_stack([np.arange(6) % 3, np.arange(6) // 3, np.zeros(6)]) * 1.0
+    root = draw.normal(size=(18, 18))
+    normals = draw.normal(size=(6, 3))
+    normals[:, 2] = np.abs(normals[:, 2])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    loads = np.zeros((18, 2))
+    loads[:, 0] = draw.normal(size=18)
+    loads[2::3, 1] = -draw.uniform(0.5, 2.0, 6)
+    stiffness = root @ root.T / 18.0 + 0.02 * np.eye(18)
+    body = jb.Substructure(places, stiffness, loads, normals=normals)
+    mu, amplitude = draw.uniform(0.5, 1.0), draw.uniform(0.2, 3.0)
+    steps = {"cycles": 1, "steps_per_half_cycle": 8}
+    found = jb.solve_contact(body, friction=mu, amplitude=amplitude, throw=False, **steps)
+    assert np.max(found.iterations) > ROUND
+    assert np.all(np.asarray(found.status) == 0)
+    normal = np.asarray(found.normal_force)
+    assert np.min(found.gap) > -1e-10
+    assert np.min(normal) >= 0.0
+    rubbed = np.linalg.norm(found.friction_force, axis=-1)
+    assert np.all(rubbed <= mu * normal + 1e-9 * np.max(normal))
 
 
 DAMAGED = ("places", "normals", "tributary", "stiffness", "forces", "flexibility")
