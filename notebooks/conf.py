@@ -12,7 +12,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
-from generate import docstrings, pages  # noqa: E402
+from generate import docstrings, lines, pages  # noqa: E402
 
 project, author = "jbeamshell", "The jbeamshell developers"
 copyright = "the jbeamshell developers, MIT licence"
@@ -55,7 +55,9 @@ warnings.filterwarnings("ignore", "JAXopt is no longer maintained", DeprecationW
 
 
 def setup(app) -> None:
-    """Write the generated pages, and read this project's docstrings as it writes them."""
+    """Write the generated pages, read this project's docstrings its way, and mark what is wide."""
     pages.write(HERE / "pages" / "generated", HERE.parent)
     app.connect("autodoc-process-docstring", docstrings.descriptions_on_lines, priority=400)
     app.connect("autodoc-skip-member", docstrings.skipped)
+    app.connect("doctree-resolved", lines.mark)
+    app.connect("html-page-context", lines.break_code)

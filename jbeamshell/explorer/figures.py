@@ -8,6 +8,7 @@ import numpy as np
 from bokeh.models import (
     BoxAnnotation,
     ColumnDataSource,
+    FixedTicker,
     LinearColorMapper,
     PrintfTickFormatter,
     Range1d,
@@ -20,6 +21,7 @@ from jbeamshell.history.history import History
 from jbeamshell.measured.loops import Loop
 from jbeamshell.plotting.shapes import KINDS, pressure_arrows, reach_of, shape_of
 from jbeamshell.plotting.style import SLIPS, STICKS
+from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.parts import Load
 
 COLOURS = (STICKS, SLIPS, "#E4E4E4")  # of KINDS
@@ -32,7 +34,9 @@ LABELS = {  # of the load and of what it moves, by load.kind
 PIXELS = 240  # of the contact map along X
 LOOSE = 0.45  # part of a range below which the data are shown larger
 MARGIN = 0.06
+AMPLITUDES = [float(f"{first}e{power}") for power in range(-12, 13) for first in (1, 2, 5)]
 HEIGHT = 300
+ARROW = 0.03  # of the picture's width, from the pulled end to its arrow
 GREY = 0.35  # opacity of a picture that is out of date
 
 
@@ -50,7 +54,7 @@ class Figures:
     def __init__(self, load: Load, whole: bool = False) -> None:
         self.cyclic, self._turns = bool(load.cycles), load.kind == "moment"
         self._load, self._moved = LABELS[load.kind]
-        self._work = "force"
+        self._work, self._amplitude = "force", unit_of("load.amplitude", load, whole)
         if whole:
             self._load, self._work = self._load.replace("/width", ""), "force length"
         self._sources: dict[str, ColumnDataSource] = {}
@@ -149,10 +153,12 @@ class Figures:
     def _curve_figure(self) -> Any:
         words = (
             "Dissipation over amplitude",
-            "amplitude A of the load",
+            f"amplitude A of the load  [{self._amplitude}]",
             f"D, work per cycle  [{self._work}]",
         )
         made = self._new(*words, x_axis_type="log", y_axis_type="log")
+        made.xaxis.ticker = FixedTicker(ticks=AMPLITUDES)
+        made.xaxis.formatter = PrintfTickFormatter(format="%g")
         look = {"line_color": KEPT, "line_width": 2, "line_dash": "dashed"}
         made.line("A", "D", source=self._empty("kept curve", A=[], D=[]), **look)
         curve = self._empty("curve", A=[], D=[])
@@ -251,7 +257,8 @@ class Figures:
         xs, ys, kinds = _runs(shape.inner[0], shape.kinds) if founded else ([], [], [])
         self.put("line", xs=xs, ys=ys, colour=[COLOURS[kind] for kind in kinds])
         force = float(view.force[moment])
-        pulled = [shape.tip[0] + 0.03 * float(history.x[-1])] if force and not self._turns else []
+        beside = ARROW * (self.deformed.x_range.end - self.deformed.x_range.start)
+        pulled = [shape.tip[0] + beside] if force and not self._turns else []
         angle = [-np.sign(force) * np.pi / 2.0] * len(pulled)
         middle = [float(shape.tip[1]) - 0.5 * shape.heights[0]] * len(pulled)
         self.put("pull", x=pulled, y=middle, angle=angle)
@@ -317,7 +324,7 @@ class Figures:
         self.contact.y_range.update(start=-0.5, end=count - 0.5)
         ticks = [0, count // 4, count // 2, 3 * count // 4, count - 1]
         self.contact.yaxis.ticker = ticks
-        labels = {tick: f"{view.force[tick] + 0.0:.3g}" for tick in ticks}
+        labels = {tick: f"{view.force[tick] + 0.0:.4g}" for tick in ticks}
         self.contact.yaxis.major_label_overrides = labels
 
     def _fit_loop(self) -> None:

@@ -303,7 +303,7 @@ class Page:
         """Say what was computed, or why to doubt it."""
         plan, own = view.history.scene.plan, self.scene.plan.nodes
         if view.doubts:
-            fewer = f" ({plan.nodes} here, {own} in the scene)" if plan.nodes != own else ""
+            fewer = f" ({plan.nodes} nodes here, {own} in the scene)" if plan.nodes != own else ""
             self._tell(view.doubts[0] + fewer, "error")
             return
         self._tell(

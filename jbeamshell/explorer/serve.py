@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import socket
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import panel as pn
 
@@ -15,6 +16,9 @@ from jbeamshell.scene.scene import Scene
 
 HERE = "127.0.0.1"
 TITLE = "jbeamshell explore"
+HEAD = """{% block preamble %}
+<meta name="viewport" content="width=device-width, initial-scale=1">
+{% endblock %}"""  # without it a phone shows the page as small as a desk's
 
 
 def serve(
@@ -42,8 +46,14 @@ def serve(
     """
     Page(scene, loops, name)  # compiles before anybody waits
     port = _free(port)
+
+    def layout() -> Any:
+        document: Any = pn.state.curdoc
+        document.template = HEAD
+        return Page(scene, loops, name).layout
+
     server = pn.serve(
-        {"/": lambda: Page(scene, loops, name).layout},
+        {"/": layout},
         port=port,
         address=HERE,
         websocket_origin=[f"{HERE}:{port}", f"localhost:{port}"],

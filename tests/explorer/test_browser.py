@@ -134,6 +134,8 @@ def processor_time(process):
 
 
 def test_a_file_is_drawn_and_the_scene_is_taken_away(page):
+    next(b for b in deep(page, "button") if b.text == "Reset").click()
+    time.sleep(1.0)  # until the sliders that another test moved are back
     file = data_folder() / "loops_eta0.1126.csv"
     deep(page, "input[type=file]")[0].send_keys(str(file))
     until(lambda: len(page.execute_script(FORCE, "measured", "F")) > 100)
@@ -153,3 +155,13 @@ def test_another_scene_has_its_own_sliders(page):
     assert "Bolt: place X" in words(page, "div")
     errors = [line for line in page.get_log("browser") if line["level"] == "SEVERE"]
     assert not errors
+
+
+def test_a_phone_sees_the_page_as_wide_as_it_is(page, address):
+    phone = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
+    page.get(address)
+    until(lambda: len(deep(page, ".noUi-handle")) >= 5 and len(deep(page, "canvas")) >= 4)
+    assert page.execute_script("return document.documentElement.scrollWidth") == 390
+    boxes = [e.rect for e in deep(page, "canvas")]
+    assert all(box["x"] + box["width"] <= 390 for box in boxes)
