@@ -16,10 +16,10 @@ from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.numbers_of import numbers_of, quiet
 from jbeamshell.common.summary import Summary, in_words
-from jbeamshell.history.error_estimates import grid_error
+from jbeamshell.history.error_estimates import CLOSES, grid_error
 from jbeamshell.history.figures import UNITS
 from jbeamshell.history.loop_figures import LoopFigures
-from jbeamshell.history.reliability import CLOSES, TOLERANCE, doubts_of_mesh
+from jbeamshell.history.reliability import TOLERANCE, doubts_of_mesh
 
 FIGURES = (
     "dissipation",

@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.numbers_of import quiet
-from jbeamshell.history.error_estimates import SlipCycle, estimates
+from jbeamshell.history.error_estimates import CLOSES, SlipCycle, estimates
 from jbeamshell.history.loop_figures import LoopFigures
 from jbeamshell.history.record import Record
 from jbeamshell.mechanics.bar import cubic_law, lap_cubic_law
@@ -122,6 +122,9 @@ class CycleFigures(Record, LoopFigures):
         """Estimated relative error of the dissipation that the grid at the loaded end makes.
 
         Rather too large than too small; infinite if nothing slips.  Of a refined grid it is at
-        least the change by the last halving of the elements.  See `History.doubts`.
+        least the change by the last halving of the elements.  A loop that does not close is off by
+        what it leaves open, at least.  See `History.doubts`.
         """
-        return self._numbers.max(self._numbers.stack(self.errors))
+        numbers, apart = self._numbers, self._numbers.abs(self.closure)
+        unclosed = numbers.where(apart > CLOSES, apart, 0.0)
+        return numbers.max(numbers.stack([*self.errors, unclosed]))

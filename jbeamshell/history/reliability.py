@@ -12,6 +12,7 @@ import jax
 import numpy as np
 from jax import Array
 
+from jbeamshell.history.error_estimates import CLOSES
 from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
@@ -21,9 +22,6 @@ from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
 
 NEGLIGIBLE = 1e-9  # tension over the pressure, taken as zero
-# Distance between the ends of a steady loop, over its width.  A node that slips by a part settles
-# within a few cycles, which changes the dissipation by 1e-5.
-CLOSES = 5e-3
 TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
 OVERSHOOT = 1.0  # error under arc-length control, times the load steps per half cycle
 FINER = "take more model.nodes"
@@ -199,7 +197,7 @@ def _unsteady(history: Run) -> tuple[str, ...]:
         return ()
     return (
         f"the last loop does not close (by {open_by:.2g} of its width): take more load.cycles "
-        "until it is steady",
+        "until it is steady, or compare with other model.nodes",
     )
 
 
