@@ -26,7 +26,7 @@ from jbeamshell.bodies.face_law import Points, contact_force
 TOLERANCE = 1e-11  # force out of balance over the largest load of a node
 ITERATIONS = 80
 ROUND = 20  # iterations after which Newton's method starts anew, from where sweeps have led
-SWEEPS = 400
+SWEEPS = 400  # between two such rounds
 SHORTER = 0.5 ** np.arange(1.0, 7.0)  # lengths that are tried where a whole Newton step fails
 PARTS = np.array([1, 2, 3, 4, 6, 8]) / 16  # of the face, on which points slide or open
 LEAST = 24  # displacements, below which a part is not worth its program
@@ -250,16 +250,14 @@ def _newton(
 
         falls = jnp.sum(at_whole**2) < (1.0 - 1e-4) * before
         u, off = lax.cond(falls, lambda: (whole, at_whole), shortened)
-        u, off = lax.cond((count + 1) % ROUND == 0, swept, lambda u: (u, off), u)
+        # A loop of no sweeps costs nothing, also under vmap, where a condition would take them all.
+        sweeps = jnp.where((count + 1) % ROUND == 0, SWEEPS, 0)
+        u, off = lax.fori_loop(0, sweeps, sweep, (u, off))
         return u, off, count + 1
 
-    def swept(u: Array) -> tuple[Array, Array]:
-        pull = face.loads[:, 0]
-
-        def sweep(_: int, u: Array) -> Array:
-            return u + sticking.moved(-residual(u), drive.driven, pull)
-
-        u = lax.fori_loop(0, SWEEPS, sweep, u)
+    def sweep(_: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
+        u, off = state
+        u = u + sticking.moved(-off, drive.driven, face.loads[:, 0])
         return u, residual(u)
 
     def goes_on(state: tuple[Array, Array, Array]) -> Array:

@@ -91,7 +91,9 @@ def solve(
         history = jax.device_get(history)
         if _stays_open(history.but(scene=precise)):
             sharp, unread = _solved(precise, loads, cycles, own, doubled(strip), smooth=False)
-            history, above = jax.device_get(sharp), unread
+            sharp = jax.device_get(sharp)
+            if not _stays_open(sharp.but(scene=precise)):
+                history, above = sharp, unread
     history = rounded(history) if single else history
     return history.but(scene=scene, above=above.but(single=single))
 
