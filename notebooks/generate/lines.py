@@ -1,4 +1,4 @@
-"""Where lines of a page may break, and what is too wide for a phone.
+"""Line breaks of a page, and tables and pictures that are too wide for a phone.
 
 A number stays with its exponent and unit, and an option with its hyphens.  Long names in code break
 behind a dot or a slash.  Wide tables and pictures get a class, by which `static/site.css` lets them

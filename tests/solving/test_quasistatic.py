@@ -63,8 +63,8 @@ def test_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
     assert float(jnp.sum(jnp.abs(history.slip_work))) / 9 < drift * 0.1 * peaks[0]
 
 
-# It was 1e-4 on a finer scene; that of all these tests has so few nodes that it creeps by 1.2e-4.
-CREEPS = pytest.param(16.0, 2e-4, marks=pytest.mark.slow)
+# It creeps ever slower: by 1.2e-4 a cycle over the first eight, by 6.6e-5 over a hundred.
+CREEPS = pytest.param(16.0, 1.5e-4, marks=pytest.mark.slow)
 
 
 @pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), CREEPS])

@@ -52,7 +52,7 @@ def test_a_bolted_lap_of_three_dimensions_is_that_of_the_plane_where_bolts_clamp
         if row["width"] > SPREAD * bolt_patch.BOLT.patch:
             assert stiffness > 0.08  # which is doubted
         else:
-            assert abs(energy) < 0.12
+            assert abs(energy) < 0.12  # 11 % at most, where 10 was asked
             assert abs(stiffness) < 0.03
 
 
