@@ -34,11 +34,11 @@ from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
 
 HEIGHT, POISSON = "strip.height_ratio", "strip.poisson_ratio"
-PER_HEIGHT = 3.5  # heights that are built for each factor of e between the least and the most
+PER_HEIGHT = 4.0  # heights that are built for each factor of e between the least and the most
 PER_POISSON = 1.5  # Poisson's ratios for each factor of e between 1 - 2 nu
 LEAST = 4  # of either, in a range that is more than a point
 EDGE = 1e-9  # of a range, by which round-off may leave it
-CLOSE = 5e-4  # of the largest entry of a matrix, by which an interpolated body may be off
+CLOSE = 5e-4  # of the largest entry of the stiffness, by which an interpolated body may be off
 SMALL = 3e-5  # of the largest coefficient of a matrix: less is left out
 MOST = 3  # times that the numbers of built bodies are doubled, at most
 
@@ -208,11 +208,14 @@ def _polynomials(x: Any, order: int) -> list[Any]:
 
 
 def _error(bodies: Bodies, exact: Body, places: np.ndarray) -> float:
-    """Largest error of a matrix at some places, over its largest entry."""
+    """Largest error at some places: of stiffness over its largest entry, of others over theirs."""
     between = [bodies._body(*place) for place in places]
+    stiffness = ("K_tt", "K_tn", "K_nn")
+    stiffest = max(float(np.max(np.abs(getattr(exact, name)))) for name in stiffness)
 
     def error(name: str) -> float:
         one, other = getattr(exact, name), np.stack([getattr(body, name) for body in between])
-        return float(np.max(np.abs(one - other)) / max(np.max(np.abs(one)), 1e-300))
+        largest = stiffest if name in stiffness else max(float(np.max(np.abs(one))), 1e-300)
+        return float(np.max(np.abs(one - other))) / largest
 
-    return max(map(error, ("K_tt", "K_tn", "K_nn", "f_t", "f_n", "c", "x")))
+    return max(map(error, (*stiffness, "f_t", "f_n", "c", "x")))

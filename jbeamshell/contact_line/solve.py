@@ -35,7 +35,6 @@ from jbeamshell.contact_line.strip import (
 from jbeamshell.contact_line.strip import pressed as pressed_strip
 from jbeamshell.contact_line.turns import Turns, known_turns, turns_of, turns_of_cycles
 from jbeamshell.contact_line.walk import Level, walk
-from jbeamshell.history.error_estimates import CLOSES
 from jbeamshell.history.history import History
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
@@ -89,22 +88,8 @@ def solve(
         history, above = _solved(precise, loads, cycles, own, doubled(strip))
         # Arrays of NumPy make figures and doubts ten times as quick as those of JAX.
         history = jax.device_get(history)
-        if _stays_open(history.but(scene=precise)):
-            sharp, unread = _solved(precise, loads, cycles, own, doubled(strip), smooth=False)
-            sharp = jax.device_get(sharp)
-            if not _stays_open(sharp.but(scene=precise)):
-                history, above = sharp, unread
     history = rounded(history) if single else history
     return history.but(scene=scene, above=above.but(single=single))
-
-
-def _stays_open(history: History) -> bool:
-    """True for a loop that does not close.
-
-    Where nodes slip and stick again and again, as near gross slip at a pinned end, the spline of
-    their events reads a wrong path, and the polygon of the events a right one.
-    """
-    return bool(history.cycles) and bool(np.abs(history.closure) > CLOSES)
 
 
 def walks_pressures(scene: Scene) -> bool:
@@ -116,17 +101,9 @@ def walks_pressures(scene: Scene) -> bool:
 
 
 def _solved(
-    scene: Scene,
-    path: LoadPath,
-    cycles: Cycles,
-    own: bool,
-    strip: Strip | None,
-    smooth: bool = True,
+    scene: Scene, path: LoadPath, cycles: Cycles, own: bool, strip: Strip | None
 ) -> tuple[History, Unread]:
-    """History without its scene, and its fields above the contact, which nobody has read.
-
-    It is read on the spline of the events, or where it is not to be smooth on their polygon.
-    """
+    """History without its scene, and its fields above the contact, which nobody has read."""
     before = scene.load.pressure_steps
     targets, parts = path.target[before:], path.pressure[before:]
     whole = not is_traced(parts) and bool(np.all(np.asarray(parts) == 1.0))
@@ -146,7 +123,7 @@ def _solved(
         require("contact.pressure", scene.contact.pressure, down, fix)
     known_turns, traced = (turns, ()) if isinstance(turns, tuple) else ((), turns)
     inputs = same, strip, targets, None if whole else parts, traced
-    history, movement = _walk(inputs, known_turns, cycles, smooth)
+    history, movement = _walk(inputs, known_turns, cycles)
     return history, Unread(strip, movement)
 
 
@@ -189,7 +166,6 @@ def _walk(
     inputs: tuple[Scene, Strip, Array, Array | None, Turns],
     known_turns: tuple[bool, ...],
     cycles: Cycles,
-    smooth: bool,
 ) -> tuple[History, Movement]:
     """History of a strip pressed down and loaded along targets; see `solve`.
 
@@ -200,18 +176,15 @@ def _walk(
     inputs : scene, its strip, loads after the pressing, parts of the pressures then if they change,
         else None, and the turns before the loads if traced, else ()
     known_turns : turns if they are known
-    smooth : True to read the spline of the events, False their polygon
     """
     scene, strip, targets, parts, traced = inputs
     turns = known_turns if isinstance(traced, tuple) else traced
-    levels = _levels(scene, strip, targets, parts, turns, smooth)
+    levels = _levels(scene, strip, targets, parts, turns)
     history, movement = _history(scene, strip, levels, parts, cycles)
     return history.but(scene=None), movement  # its numbers would be copied
 
 
-def _levels(
-    scene: Scene, strip: Strip, targets: Array, parts: Array | None, turns: Turns, smooth: bool
-) -> Level:
+def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, turns: Turns) -> Level:
     """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
     body, friction, member = strip.body, scene.contact.friction, scene.member
     lift, bearing = strip.lift, member.bearing_stiffness
@@ -235,7 +208,7 @@ def _levels(
     elif parts is not None:
         levels = walk_with_pressures(body, press, friction, start, targets, parts, flat)
     else:
-        levels = walk(body, friction, start, targets, turns, flat, smooth)
+        levels = walk(body, friction, start, targets, turns, flat)
     sound = jnp.all(jnp.isfinite(strip.lift))
     state = levels.state
     if scene.load.control == "displacement":

@@ -27,7 +27,7 @@ from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.noisy_drive import noises_of
 from jbeamshell.measured.splitting import split_cycles
-from jbeamshell.measured.steady import steady_loops
+from jbeamshell.measured.steady import mean_loops, steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
 
@@ -267,8 +267,8 @@ class Specimen:
                 return [recording]
             noise = found.noise / np.ptp(found.path)
             quiet = noises_of(found, list(found.cycles)) is None
-            if len(found.cycles) == 1 and noise < QUIET and quiet:
-                return [recording]
+            once = len(found.cycles) == 1 and noise < QUIET and quiet
+            return [recording] if once else mean_loops(found)
         return steady_loops(recording, driver, self.drift)
 
 

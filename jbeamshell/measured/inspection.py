@@ -19,7 +19,7 @@ from jbeamshell.measured.loop_files import FilePath, read_loops
 from jbeamshell.measured.loop_shape import KINDS, shape_of
 from jbeamshell.measured.loops import WORK, Loop
 from jbeamshell.measured.splitting import split_cycles
-from jbeamshell.measured.steady import steady_loops
+from jbeamshell.measured.steady import mean_loops
 
 UNDO = "--unchecked (in Python unchecked=True) fits all the same"
 
@@ -217,7 +217,7 @@ def _view(recording: Loop, stiffness: tuple[float, float] | None) -> View:
         return View(recording, None, (), (*findings, *of_loading(recording)), reason)
     levels = tuple(
         Level(loop, len(found.group(number)), shape_of(found, number, recording.cycles))
-        for number, loop in enumerate(steady_loops(recording, found.driver))
+        for number, loop in enumerate(mean_loops(found))
     )
     findings += of_levels(levels, found, findings, stiffness)
     return View(recording, found.driver, levels, tuple(findings))

@@ -71,9 +71,13 @@ def steady_loops(
     found = split_cycles(recording, driver, smallest=smallest)
     if drift != "keep":
         found = without_drift(found, drift, smallest)
-    loops = [_mean_loop(found, number, steady, points) for number in range(found.groups)]
     # Removing a drift also removes the zeros of the columns.
-    return [loop.but(free_zero=drift != "keep") for loop in loops]
+    return [loop.but(free_zero=drift != "keep") for loop in mean_loops(found, steady, points)]
+
+
+def mean_loops(found: Cycles, steady: float = STEADY, points: int = POINTS) -> list[Loop]:
+    """Closed loops of cycles that were found, one per amplitude; see `steady_loops`."""
+    return [_mean_loop(found, number, steady, points) for number in range(found.groups)]
 
 
 def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:

@@ -102,9 +102,14 @@ def layered_form(material: Material) -> SectionForm:
         (across(heights), rest),
         (rest, across(heights)),
     ]
-    # What differs between an element's ends bends it: as if bubbles along X relieved the strains
-    # that linear fields cannot (Wilson's incompatible modes; Taylor, Beresford & Wilson 1976).
-    spread = jnp.block([[zero, zero], [zero, summed((c - lam**2 / c) / h, slope)]]) / 12.0
+    # What differs between an element's ends is integrated over it.  Without that, slip to and fro
+    # from node to node would cost no shear (hourglass modes; Flanagan & Belytschko 1981).  Bubbles
+    # along X relieve what linear fields would lock in: strains across, and the shear of a section
+    # that turns as a whole (Wilson's incompatible modes; Taylor, Beresford & Wilson 1976).
+    shear = summed(g / h, slope)
+    turned = shear @ heights
+    shear = shear - jnp.outer(turned, turned) / (heights @ turned)
+    spread = jnp.block([[shear, zero], [zero, summed((c - lam**2 / c) / h, slope)]]) / 12.0
     return SectionForm(
         values=values[pick],
         mixed=mixed_form[pick],

@@ -71,6 +71,29 @@ class TestSection:
         np.testing.assert_allclose(form.further @ form.modes[3, 0], [0.0, 1.0], atol=1e-12)
         np.testing.assert_allclose(form.pull @ form.modes[0, 1], 1.0, rtol=1e-12)
 
+    def test_slip_to_and_fro_from_node_to_node_costs_shear(self):
+        """Slip in waves on a half plane that stays flat: 4 G (1 - nu)/(3 - 4 nu) times 2 pi/wave.
+
+        It follows from the plane's equations for waves.  With one integration point in each element
+        a wave of two elements would cost nothing, and nodes would slip and stick one by one.
+        """
+        nu, length, one = 0.3, 0.02, jnp.ones(1)
+        lam, stiffness = 2.0 * nu / (1.0 - 2.0 * nu), 2.0 * (1.0 - nu) / (1.0 - 2.0 * nu)
+        form = layered_form(Material(one, stiffness * one, lam * one, one))
+        start, end, across = (np.asarray(part[0]) for part in form.element(length * one))
+        parts = []
+        for elements in (16, 8, 4, 2):  # of a wave
+            turn = np.exp(2j * np.pi / elements)
+            whole = start + end + turn * across + across.T / turn
+            inner = np.linalg.solve(whole[2:, 2:], whole[2:, 0])
+            found = (whole[0, 0] - whole[0, 2:] @ inner).real / length
+            wave = 2.0 * np.pi / (elements * length)
+            parts.append(found / (4.0 * (1.0 - nu) / (3.0 - 4.0 * nu) * wave))
+        errors = 1.0 - np.array(parts)
+        assert errors[0] == pytest.approx(errors[1] / 4.0, rel=0.1)
+        assert errors[1] < 0.08
+        assert errors[3] < 0.6
+
 
 class TestBody:
     def test_elimination_is_that_of_the_whole_matrix(self):

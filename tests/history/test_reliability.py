@@ -224,24 +224,35 @@ def test_a_nearly_incompressible_strip_does_not_lock(section):
     assert error < float(found.dissipation_error) < found.scene.model.tolerance
 
 
-# Near gross slip nodes at a pinned end slip and stick again and again.
+# Where elements let nodes slip to and fro for nothing, these two chatter: nodes slip and stick by
+# turns, responses of the first are 3 % off, and grids of the second are 2.5 % apart.
 PINNED = {"load.entry": "guided", "strip.far_end": "pinned", "load.amplitude": 2.655134829}
 PINNED |= {"strip.height_ratio": 0.0519514579, "strip.poisson_ratio": 0.4336321978}
 PINNED |= {"contact.friction": 0.1416343096}
-OF_GOODMAN = 0.98945  # its dissipation, on 193 and 257 nodes
+LIFTED = {"load.entry": "member", "load.amplitude": 0.8033347331, "contact.friction": 0.08781114857}
+LIFTED |= {"strip.height_ratio": 0.03470367537, "strip.poisson_ratio": 0.1609738187}
+LIFTED["contact.bottom_pressure"] = [[0.717, 0.0], [0.717, 5.6245], [1.955, 5.6245], [1.955, 0.0]]
 
 
-def test_a_plain_call_reads_the_polygon_where_the_spline_does_not_close():
-    found = jb.solve(jb.Scene().replace(PINNED))
-    assert float(found.dissipation_ratio) == pytest.approx(OF_GOODMAN, rel=2e-3)
+@pytest.mark.parametrize(("values", "fine"), [(PINNED, 2.5642e-4), (LIFTED, 2.19327e-5)])
+def test_nodes_do_not_chatter_near_gross_slip(values, fine):
+    """Dissipation beside that on 257 nodes; also read by a response, whose loops close too."""
+    scene = jb.Scene().replace(values)
+    found, ask = jb.solve(scene), jb.response(scene, ["load.amplitude"])
+    assert float(found.dissipation) == pytest.approx(fine, rel=1e-3)
     assert abs(float(found.closure)) < error_estimates.CLOSES
+    read = float(ask(values["load.amplitude"])["dissipation"])
+    assert read == pytest.approx(float(found.dissipation), rel=1e-3)
 
 
 def test_a_loop_that_does_not_close_is_off_by_what_it_leaves_open():
-    scene, figures = jb.Scene().replace(PINNED), ["dissipation_ratio", "dissipation_error"]
-    ask = jb.response(scene, ["load.amplitude"], figures)  # which only has the spline
-    ratio, error = (float(ask(PINNED["load.amplitude"])[name]) for name in figures)
-    assert 0.1 < abs(ratio / OF_GOODMAN - 1.0) < error
+    found = jb.solve(jb.Scene())
+    u = np.array(found.displacement)
+    u[-1] += 0.1 * np.ptp(u)
+    opened = found.but(displacement=u)
+    assert float(found.dissipation_error) < 0.01
+    assert float(opened.dissipation_error) == pytest.approx(abs(float(opened.closure)))
+    assert any("does not close" in doubt for doubt in opened.doubts)
 
 
 @pytest.mark.slow
