@@ -223,9 +223,9 @@ def drawn(kind: str, number: int, seed: int = SEED) -> Values:
 
 def row(kind: str, number: int, seed: int = SEED) -> Values:
     """Errors of a plain call, and what it doubts."""
-    scene = jb.Scene().replace(drawn(kind, number, seed))
     found: Values = {"number": number}
     try:
+        scene = jb.Scene().replace(drawn(kind, number, seed))
         plain = jb.solve(scene, throw=False)
     except jb.InputError as refusal:
         return found | {"refused": str(refusal)}

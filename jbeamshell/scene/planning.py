@@ -72,7 +72,7 @@ CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
 BAR = Grid(97, 1.0 / 16.0, 2.0, 20, halvings=2)  # D within a tenth of the tolerance
 SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
-PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20, halvings=1)
+PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20, halvings=2)
 PRESSED_SIZE = 0.125  # largest elements over H of a strip that is only pressed
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
