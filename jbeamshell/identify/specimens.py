@@ -38,6 +38,7 @@ WRONG_DRIVE = (
 )
 QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
 OF_SHEAR = ("strip.kappa_s", "strip.poisson_ratio", "strip.curvature")
+WIDEST = 5.0  # m, of a specimen; a larger number was meant in millimetres
 ZEROS = {"rig.force_zero", "rig.displacement_zero"}
 
 
@@ -207,6 +208,11 @@ class Specimen:
                     raise InputError(
                         f"{item.label}: its columns name no units, but the specimen's dimensions "
                         "do: give --unit force=N --unit displacement=mm, or what they are"
+                    )
+                if item.units is not None and width is not None and width > WIDEST:
+                    raise InputError(
+                        f"strip.width = {width:g}: beside {item.label}, whose columns have units, "
+                        f"it is in metres: give {1e-3 * width:g}, or --width {width:g}mm"
                     )
                 item = item if width is None else item.of_width(width)
             if isinstance(item, Loop) and item.as_recorded:

@@ -70,6 +70,12 @@ def test_totals_of_a_specimen_without_a_width_are_refused(tmp_path, capsys):
     assert "is a total, but the specimen has no width: give --width" in capsys.readouterr().err
 
 
+def test_a_width_beside_data_with_units_is_in_metres(tmp_path, capsys):
+    file = written(tmp_path, loop(jb.Scene().replace(STRIP)), "N")
+    assert main(["fit", str(file), "--width", "50"]) == 2
+    assert "it is in metres: give 0.05, or --width 50mm" in capsys.readouterr().err
+
+
 def test_a_width_refuses_forces_of_a_scene_per_width(tmp_path):
     file = written(tmp_path, loop(jb.Scene().replace(STRIP)), "N")
     values = {"strip.axial_stiffness": 2.5e9, "strip.length": 0.12}
