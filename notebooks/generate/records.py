@@ -45,6 +45,7 @@ def tables(root: Path) -> dict[str, str]:
         "table_motion.md": motion(_read(benchmarks / "dynamics.json")),
         "table_laws.md": laws(_read(studies / "laws_of_a_strip.json")),
         "table_squeeze.md": squeeze(_read(verification / "squeezed_sections.json")),
+        "table_plain.md": plain_calls(_read(verification / "plain_random.json")),
         "table_random.md": random_strips(_read(verification / "failure_map.json")),
         "table_derivatives.md": derivatives(_read(verification / "gradients.json")),
         "table_smooth_slopes.md": smooth_slopes(_read(verification / "smooth_slopes.json")),
@@ -63,6 +64,21 @@ def single(record: dict) -> str:
     )  # fmt: skip
     heads = ("what", "steps per half cycle", "time", "error of D", "to elements", "returns")
     return table(heads, rows) + machine(record["about"]["one"])
+
+
+def plain_calls(record: dict) -> str:
+    """Plain calls of random scenes beside a fine grid, by kind."""
+    kept = {name: part["summary"] for name, part in record.items() if "summary" in part}
+    whole = ("scenes", "wrong", "wrong and not doubted", "doubted in vain")
+    rows = [
+        (name, *(part[key] for key in whole),
+         percent(part["D, 50 %"] / 100.0), percent(part["D, 95 %"] / 100.0))
+        for name, part in kept.items()
+    ]  # fmt: skip
+    total = [sum(part[key] for part in kept.values()) for key in whole]
+    heads = ("scenes", "number", "off by 2 % and more", "of these undoubted", "doubted in vain",
+             "error of D, median", "95 % below")  # fmt: skip
+    return table(heads, [*rows, ("all", *total, "", "")])
 
 
 def smooth_slopes(record: dict) -> str:

@@ -18,6 +18,7 @@ from jbeamshell.scene.planning import PLANE_NODES
 
 STRIP = jax.jit(lambda scene: strip.condensed(scene, PLANE_NODES))
 TURNS = jnp.asarray([1.0, -1.0, 1.0, -1.0, 1.0])
+NU = 0.3
 
 
 def plane(scene, **values):
@@ -46,6 +47,28 @@ def eliminated(x, loads, given):
     far, loaded = end_section(form, "held"), end_section(form)
     ((elimination, found),) = strip.eliminate(form, x, loads[:, None], far, loaded)
     return form.element(jnp.diff(x)), found, elimination.recovered(given)
+
+
+def in_waves(elements, length, moved, held):
+    """Stiffness of a strip, its height and G 1, against a field that moves in waves of elements.
+
+    Parameters
+    ----------
+    moved, held : places of that field and of those that stay; all others are free
+    """
+    one, lam, stiffness = (
+        jnp.ones(1),
+        2.0 * NU / (1.0 - 2.0 * NU),
+        2.0 * (1.0 - NU) / (1.0 - 2.0 * NU),
+    )
+    form = layered_form(Material(one, stiffness * one, lam * one, one))
+    start, end, across = (np.asarray(part[0]) for part in form.element(length * one))
+    turn = np.exp(2j * np.pi / elements)
+    whole = start + end + turn * across + across.T / turn
+    free = np.setdiff1d(np.arange(len(whole)), moved + held)
+    inner = np.linalg.solve(whole[np.ix_(free, free)], whole[np.ix_(free, moved)])
+    (found,) = (whole[np.ix_(moved, moved)] - whole[np.ix_(moved, free)] @ inner).ravel()
+    return found.real / length
 
 
 class TestSection:
@@ -77,22 +100,23 @@ class TestSection:
         It follows from the plane's equations for waves.  With one integration point in each element
         a wave of two elements would cost nothing, and nodes would slip and stick one by one.
         """
-        nu, length, one = 0.3, 0.02, jnp.ones(1)
-        lam, stiffness = 2.0 * nu / (1.0 - 2.0 * nu), 2.0 * (1.0 - nu) / (1.0 - 2.0 * nu)
-        form = layered_form(Material(one, stiffness * one, lam * one, one))
-        start, end, across = (np.asarray(part[0]) for part in form.element(length * one))
         parts = []
         for elements in (16, 8, 4, 2):  # of a wave
-            turn = np.exp(2j * np.pi / elements)
-            whole = start + end + turn * across + across.T / turn
-            inner = np.linalg.solve(whole[2:, 2:], whole[2:, 0])
-            found = (whole[0, 0] - whole[0, 2:] @ inner).real / length
-            wave = 2.0 * np.pi / (elements * length)
-            parts.append(found / (4.0 * (1.0 - nu) / (3.0 - 4.0 * nu) * wave))
+            wave = 2.0 * np.pi / (elements * 0.02)
+            exact = 4.0 * (1.0 - NU) / (3.0 - 4.0 * NU) * wave
+            parts.append(in_waves(elements, 0.02, [0], [1]) / exact)
         errors = 1.0 - np.array(parts)
         assert errors[0] == pytest.approx(errors[1] / 4.0, rel=0.1)
         assert errors[1] < 0.08
         assert errors[3] < 0.6
+
+    def test_long_elements_bend_as_a_beam(self):
+        """Ten heights long, they would lock thirtyfold if all shear were integrated."""
+        wave = 2.0 * np.pi / (16 * 10.0)
+        plane_modulus = 2.0 * (1.0 + NU) / (1.0 - NU**2)  # of G = 1
+        assert in_waves(16, 10.0, [1], []) == pytest.approx(
+            plane_modulus / 12.0 * wave**4, rel=0.05
+        )
 
 
 class TestBody:
