@@ -29,7 +29,7 @@ class SectionForm(NamedTuple):
     pull : (m,) parts of the fields in the displacement along X that the end load moves through
     turn : (m,) parts of the fields in the mean rotation, which an end moment moves through
     press : (m,) parts of the fields in the lift of the top face
-    held : (m,) True for fields that are zero at a held far end
+    held : (m,) True for fields that are zero at a held far end: those along X
     further : (k, m) parts of the fields in those that a history has beside v and w: the rotation
         beta and the squeeze strain psi (their means over the height, if the section bends)
     modes : (5, 2, m) fields and slopes that are a unit strain e, g, k, psi and psi'; zero for a
@@ -61,6 +61,15 @@ class SectionForm(NamedTuple):
         even, odd = 0.5 * (self.mixed + self.mixed.T), 0.5 * (self.mixed - self.mixed.T)
         diagonal = mean + slope + spread
         return diagonal - even, diagonal + even, mean - slope - spread + odd
+
+    @property
+    def beside_contact(self) -> SectionForm:
+        """Form of elements that touch no base: their shear is that of their middle alone.
+
+        Nothing slips there to and fro, and elements that grow fast along X are not too stiff.
+        """
+        along = np.outer(self.held, self.held)
+        return self._replace(spread=jnp.where(along, 0.0, self.spread))
 
     def moved(self, length: Array) -> tuple[Array, Array]:
         """Forces (m, m) from fields at an element's start and end to both ends together.

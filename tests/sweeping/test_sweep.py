@@ -418,18 +418,18 @@ def test_lanes_of_plane_elasticity_share_their_bodies():
 
 
 ON_257_NODES = (  # height ratio, load and dissipation of strips of plane elasticity
-    (0.4, 0.153447, 6.05061e-12),
-    (0.4, 0.179814, 3.19639e-11),
-    (0.4, 0.246919, 5.33259e-10),
-    (0.4, 0.465602, 3.41315e-08),
-    (0.1126, 0.050571, 6.29473e-13),
-    (0.1126, 0.095359, 1.08551e-10),
-    (0.1126, 0.465602, 8.57554e-07),
-    (0.1126, 1.028824, 1.83059e-05),
-    (0.03, 0.014223, 2.00473e-14),
-    (0.03, 0.026819, 2.91964e-12),
-    (0.03, 0.050571, 1.28779e-10),
-    (0.03, 0.749222, 8.07767e-06),
+    (0.4, 0.153447, 6.05986e-12),
+    (0.4, 0.179814, 3.19883e-11),
+    (0.4, 0.246919, 5.33496e-10),
+    (0.4, 0.465602, 3.41438e-08),
+    (0.1126, 0.050571, 6.29666e-13),
+    (0.1126, 0.095359, 1.08674e-10),
+    (0.1126, 0.465602, 8.57518e-07),
+    (0.1126, 1.028824, 1.83096e-05),
+    (0.03, 0.014223, 2.00681e-14),
+    (0.03, 0.026819, 2.92243e-12),
+    (0.03, 0.050571, 1.28813e-10),
+    (0.03, 0.749222, 8.07911e-06),
 )
 
 
@@ -445,6 +445,6 @@ def test_lanes_of_plane_elasticity_are_doubted_where_they_are_off():
     found, fine = every.isel(lane=slice(12)), fine[:12]
     off = np.abs(found["dissipation"] / fine - 1.0)
     assert np.all(off <= found["dissipation_error"])
-    assert np.sum(off > 0.02) == 4
+    assert np.sum(off > 0.02) == 5
     assert np.all(found["doubtful"][off > 0.02])
-    assert np.sum(found["doubtful"]) <= 5
+    assert np.sum(found["doubtful"]) <= 7
