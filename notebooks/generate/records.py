@@ -78,7 +78,7 @@ def plain_calls(record: dict) -> str:
     total = [sum(part[key] for part in kept.values()) for key in whole]
     heads = ("scenes", "number", "off by 2 % and more", "of these undoubted", "doubted in vain",
              "error of D, median", "95 % below")  # fmt: skip
-    return table(heads, [*rows, ("all", *total, "", "")])
+    return table(heads, [*rows, ("all", *total, "", "")]) + machine(record["about"])
 
 
 def smooth_slopes(record: dict) -> str:
