@@ -1,7 +1,7 @@
 """Bodies of strips between built ones: Chebyshev polynomials of height and Poisson's ratio.
 
 In units of E' the stiffness of a strip on its contact line depends on L/H and nu alone, and
-smoothly so in ln(L/H) and ln(1 - 2 nu): some sixteen heights stand for all from .02 to .8, and ten
+smoothly so in ln(L/H) and ln(1 - 2 nu): some nineteen heights stand for all from .02 to .8, and ten
 Poisson's ratios for all from 0 to .49.  Interpolating what a body answers with would fail, because
 that is rough where the end of a slip zone passes a node.
 """

@@ -447,4 +447,4 @@ def test_lanes_of_plane_elasticity_are_doubted_where_they_are_off():
     assert np.all(off <= found["dissipation_error"])
     assert np.sum(off > 0.02) == 5
     assert np.all(found["doubtful"][off > 0.02])
-    assert np.sum(found["doubtful"]) <= 7
+    assert np.sum(found["doubtful"]) <= 7  # the other two are off by 1.6 %
