@@ -21,7 +21,7 @@ from jax import Array, lax
 
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.contact_line.ends import End
-from jbeamshell.mechanics.section_form import SectionForm
+from jbeamshell.mechanics.section_form import Matrices, SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky
 
 PARTS = 3  # of a strip, eliminated one after the other with as many contact nodes as they know
@@ -170,8 +170,7 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         carry: tuple[Array, Array], station: tuple[Array, ...]
     ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
         before, forces = carry
-        i, load, length = station
-        start, _, across = (part[0] for part in form.element(length[None]))
+        i, load, length, start, across = station
         stays, follows = form.moved(length)
         forces = forces + _in_last_columns(form.press[2:, None] * load, forces)
         contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
@@ -183,9 +182,11 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         whole = (stays + follows)[2:, 2:]
         return (before + whole - onwards.T @ onwards, forces), (inverse, sides, onwards)
 
-    carry, first, hessian = _begin(form, x, loads[0], far)
+    lengths = jnp.diff(x)
+    start, end, across = form.element(lengths)
+    carry, first, hessian = _begin(form, (start[0], end[0], across[0]), loads[0], far)
     hessian, parts = _wider(_wider(hessian, columns, count).T, columns, count), []
-    stations = (jnp.arange(1, n - 1), loads[1:-1], jnp.diff(x)[1:])
+    stations = (jnp.arange(1, n - 1), loads[1:-1], lengths[1:], start[1:], across[1:])
     # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
     several = PARTS if n > FEW else 1
     for begin, stop in itertools.pairwise(np.linspace(0, n - 2, several + 1).astype(int)):
@@ -199,7 +200,8 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         jnp.concatenate([part[2] for part in parts]),
     )
     first = _wider(first[0], columns, count), first[1]
-    hessian, sizes = hessian + _contacts(form, x, loads), jnp.ones(loads.shape[1], x.dtype)
+    hessian = hessian + _contacts(form, (start, end, across), loads)
+    sizes = jnp.ones(loads.shape[1], x.dtype)
     ends = [_finish(form, loads[-1], carry, end) for end in last]
     return tuple(
         Line(Elimination(inverse, sides, onwards, first, fields, sizes), hessian + change)
@@ -208,12 +210,13 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
 
 
 def _begin(
-    form: SectionForm, x: Array, load: Array, far: End
+    form: SectionForm, element: Matrices, load: Array, far: End
 ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
     """Elimination of the first station; the sides are v and w of two stations, and the loads.
 
     Parameters
     ----------
+    element : matrices (m, m) of the first element, see `SectionForm.element`
     load : (p,) nodal forces of the pressures
 
     Returns
@@ -222,7 +225,7 @@ def _begin(
     first : fields of the first station from the sides (m-2, 5 + p) and from the next (m-2, m-2)
     hessian : (5 + p, 5 + p) of the energy of the first station's fields in the sides
     """
-    start, end, across = (part[0] for part in form.element(x[1:2] - x[:1]))
+    start, end, across = element
     none = jnp.zeros_like(start[:, :1])
     forces = [none, none, across[:, :2], none, load * form.press[:, None]]
     fields, back, hessian = _of_end(start, jnp.concatenate(forces, axis=1), far, 0)
@@ -294,13 +297,13 @@ def _wider(sides: Array, columns: int, count: int) -> Array:
     return jnp.concatenate([jnp.pad(sides[..., :-count], empty), sides[..., -count:]], axis=-1)
 
 
-def _contacts(form: SectionForm, x: Array, loads: Array) -> Array:
+def _contacts(form: SectionForm, elements: Matrices, loads: Array) -> Array:
     """Stiffness (2n+1+p, 2n+1+p) of the elements among v and w, and the forces of the pressures.
 
     The parts of the fields of both ends are left out, which have conditions of their own.
     """
-    n = x.size
-    start, end, across = (part[:, :2, :2] for part in form.element(jnp.diff(x)))
+    n, dtype = loads.shape[0], loads.dtype
+    start, end, across = (part[:, :2, :2] for part in elements)
     inner = (np.arange(n) > 0) & (np.arange(n) < n - 1)
     start, across = (jnp.where(inner[:-1, None, None], part, 0.0) for part in (start, across))
     diagonal = jnp.pad(start, ((0, 1), (0, 0), (0, 0))) + jnp.pad(end, ((1, 0), (0, 0), (0, 0)))
@@ -311,8 +314,8 @@ def _contacts(form: SectionForm, x: Array, loads: Array) -> Array:
     stiffness = jnp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n)
     inner_loads = jnp.where(inner[:, None], loads, 0.0)
     press = (inner_loads[:, None] * form.press[:2, None]).reshape(2 * n, -1)
-    sides = jnp.column_stack([jnp.zeros(2 * n, x.dtype), press])
-    return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((sides.shape[1],) * 2, x.dtype)]])
+    sides = jnp.column_stack([jnp.zeros(2 * n, dtype), press])
+    return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((sides.shape[1],) * 2, dtype)]])
 
 
 def _products(sides: Array, columns: int, count: int) -> Array:

@@ -100,7 +100,6 @@ def beyond(form: SectionForm, lengths: Array, outer: End, forwards: bool) -> End
     outer : outer end
     forwards : True if the length goes on towards greater X
     """
-    form = form.beside_contact
     near, far, between = _long(form, lengths[-1], forwards)
     first = near, jnp.zeros_like(outer.pull), outer.softness
     if outer.span.shape[1]:  # something moves there

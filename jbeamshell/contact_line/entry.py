@@ -33,7 +33,6 @@ from jbeamshell.scene.scene import Scene
 
 PER_REACH = 1.0 / 6.0  # of the elements of the contact, in that length
 LEAST = 24  # elements there, on 49 nodes a fourth of the error of 8 where little slips
-GIVEN = 16  # elements of a length that is given
 END_SIZE = 1e-4  # of H, smallest element, beside the contact
 GROWTH = 0.3  # of the element size over the distance from there
 FREE = np.zeros(2, bool)
@@ -71,7 +70,7 @@ def loaded_end(scene: Scene, form: SectionForm, mounted: bool) -> Held:
         return Held(end_section(form), FREE)
     if strip.overhang is not None:
         outer = end_section(form, along, level, on_contact=False)
-        lengths = _lengths(strip.overhang, strip.half_height, GIVEN)
+        lengths = _lengths(strip.overhang, strip.half_height, LEAST)
         return Held(beyond(form, lengths, outer, True), FREE)
     if goes_on(scene):
         outer, reach = end_section(form, level=level, on_contact=False), REACH * strip.half_height
@@ -109,7 +108,7 @@ def leaving_end(
     if not mounted:
         return Held(end_section(form), np.array([True, clamped])), stretch
     if member.overhang is not None:
-        lengths = _lengths(member.overhang, half_height, GIVEN)
+        lengths = _lengths(member.overhang, half_height, LEAST)
     elif goes_on(scene):
         reach, bends = REACH * half_height, clamped and scene.member.loaded_end == "free"
         lengths = _lengths(reach, half_height, _count(scene))

@@ -102,14 +102,6 @@ def layered_form(material: Material) -> SectionForm:
         (across(heights), rest),
         (rest, across(heights)),
     ]
-    # What differs between an element's ends is integrated over it.  Without that, slip to and fro
-    # from node to node would cost no shear (hourglass modes; Flanagan & Belytschko 1981).  Bubbles
-    # along X relieve what linear fields would lock in: strains across, and the shear of a section
-    # that turns as a whole (Wilson's incompatible modes; Taylor, Beresford & Wilson 1976).
-    shear = summed(g / h, slope)
-    turned = shear @ heights
-    shear = shear - jnp.outer(turned, turned) / (heights @ turned)
-    spread = jnp.block([[shear, zero], [zero, summed((c - lam**2 / c) / h, slope)]]) / 12.0
     return SectionForm(
         values=values[pick],
         mixed=mixed_form[pick],
@@ -120,7 +112,7 @@ def layered_form(material: Material) -> SectionForm:
         held=np.append(np.ones(size, bool), np.zeros(size, bool))[place],
         further=jnp.stack([along(rotation), across(squeeze) / edges[-1]]),
         modes=jnp.asarray([jnp.stack(mode) for mode in modes]),
-        spread=spread[pick],
+        spread=None,
         masses=jnp.stack([squares(i) for i in range(count)]),
         top=int(np.flatnonzero(place == size + layers)[0]),
     )

@@ -2,7 +2,11 @@
 
 With the fields q of a section and their slopes q' along X, the energy per length and width is
 1/2 (q, q') S (q, q').  An element is linear in X: its energy is that of its ends' mean fields with
-the slope between them, and of the difference of its ends' fields.
+the slope between them, and of the difference of its ends' fields.  What differs between the ends of
+an element of plane elasticity is integrated over it, or slip to and fro from node to node would
+cost no shear (an hourglass mode; Flanagan & Belytschko 1981).  Incompatible modes within the
+element, parabolas of X that are zero at its ends, relieve what linear fields lock in: the shear of
+a section that turns, and strains across (Wilson et al. 1973; Taylor, Beresford & Wilson 1976).
 """
 
 from __future__ import annotations
@@ -16,8 +20,10 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.mechanics.kinematics import FIELDS, Section
+from jbeamshell.numerics.factors import inverse_cholesky
 
 V, W, BETA, PSI = range(len(FIELDS))
+Matrices = tuple[Array, Array, Array]
 
 
 class SectionForm(NamedTuple):
@@ -35,7 +41,7 @@ class SectionForm(NamedTuple):
     modes : (5, 2, m) fields and slopes that are a unit strain e, g, k, psi and psi'; zero for a
         strain that the section does not have
     spread : (m, m) second derivatives of the energy in how far the fields at an element's ends
-        differ, per length
+        differ, per length; None for those of linear fields with incompatible modes
     masses : (layers, m, m) integrals of the squared displacement over each layer of material
     top : place of the field beyond v and w with which the top face rises most; 0 if there is none
     """
@@ -49,27 +55,34 @@ class SectionForm(NamedTuple):
     held: np.ndarray
     further: Array
     modes: Array
-    spread: Array
+    spread: Array | None
     masses: Array
     top: int
 
-    def element(self, lengths: Array) -> tuple[Array, Array, Array]:
+    def element(self, lengths: Array) -> Matrices:
         """Matrices (elements, m, m) of elements: start and start, end and end, start and end."""
         h = lengths[:, None, None]
-        slope, spread = self.slopes / h, h * self.spread
+        spread = jax.vmap(self._relieved)(lengths) if self.spread is None else self.spread
+        slope, spread = self.slopes / h, h * spread
         mean = 0.25 * h * self.values
         even, odd = 0.5 * (self.mixed + self.mixed.T), 0.5 * (self.mixed - self.mixed.T)
         diagonal = mean + slope + spread
         return diagonal - even, diagonal + even, mean - slope - spread + odd
 
-    @property
-    def beside_contact(self) -> SectionForm:
-        """Form of elements that touch no base: their shear is that of their middle alone.
+    def _relieved(self, length: Array) -> Array:
+        """Spread (m, m) of linear fields, relieved by parabolas, in an element of plane elasticity.
 
-        Nothing slips there to and fro, and elements that grow fast along X are not too stiff.
+        Parabolas of the fields across relieve those along, and the other way round.
         """
-        along = np.outer(self.held, self.held)
-        return self._replace(spread=jnp.where(along, 0.0, self.spread))
+        bubbles = self.slopes + 0.1 * length**2 * self.values
+        found = jnp.zeros_like(self.values)
+        along, across = np.flatnonzero(self.held), np.flatnonzero(~self.held)
+        for own, other in ((along, across), (across, along)):
+            inverse = inverse_cholesky(bubbles[np.ix_(other, other)])
+            relief = inverse @ self.mixed[np.ix_(own, other)].T
+            own_values = self.values[np.ix_(own, own)] - relief.T @ relief
+            found = found.at[np.ix_(own, own)].set(own_values / 12.0)
+        return found
 
     def moved(self, length: Array) -> tuple[Array, Array]:
         """Forces (m, m) from fields at an element's start and end to both ends together.
@@ -142,6 +155,6 @@ def _within(form: SectionForm, fields: Array, places: np.ndarray) -> SectionForm
         held=form.held[places],
         further=form.further @ fields,
         modes=form.modes[..., places],
-        spread=within(form.spread),
+        spread=None if form.spread is None else within(form.spread),
         masses=jax.vmap(within)(form.masses),
     )

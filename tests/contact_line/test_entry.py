@@ -95,7 +95,7 @@ class TestBeyond:
         ]
         assert np.all(np.diff(parts) > 0.0)
         assert parts[0] < 0.75
-        np.testing.assert_allclose(parts[2:], 1.0, rtol=2e-3)
+        np.testing.assert_allclose(parts[2:], 1.0, rtol=1e-3)
 
     def test_a_given_length_adds_its_stretch(self):
         scene = PLANE.replace({"load.amplitude": 0.4359})
