@@ -26,28 +26,36 @@ def box(
     held=None,
     quadratic=False,
 ):
-    """Model of a box, and the places (N, 3) of its nodes, numbered from 1.
+    """Model of a box of equal bricks, and the places of its nodes, see `on_grid`."""
+    lines = [a + np.linspace(0.0, s, n + 1) for a, s, n in zip(at, sizes, counts, strict=True)]
+    return on_grid(lines, modulus, poisson, density, held, quadratic)
 
-    ``held`` is True for the places that do not move.
+
+def on_grid(lines, modulus=210e3, poisson=0.3, density=7.85e-9, held=None, quadratic=False):
+    """Model of bricks between lines along X, Y and Z, and the places (N, 3) of its nodes.
+
+    Nodes are numbered from 1.  ``held`` is True for the places that do not move.
     """
-    edges, step = np.divide(sizes, counts), 2 if quadratic else 1
-    fine = [step * n for n in counts]
-    axes = [a + np.linspace(0.0, s, n + 1) for a, s, n in zip(at, sizes, fine, strict=True)]
+    step = 2 if quadratic else 1
+    axes = [np.interp(np.arange(step * (len(a) - 1) + 1) / step, range(len(a)), a) for a in lines]
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    number = np.arange(len(places)).reshape([n + 1 for n in fine])
+    number = np.arange(len(places)).reshape([len(a) for a in axes])
+    counts = [len(a) - 1 for a in lines]
     nodes = EDGES if quadratic else CORNERS
     away = ((1.0 + nodes) * step / 2).astype(int)
     first = [step * np.array(place) for place in itertools.product(*map(range, counts))]
     bricks = np.array([number[tuple((place + away).T)] for place in first])
     used, bricks = np.unique(bricks, return_inverse=True)
     places, bricks = places[used], bricks.reshape(len(first), len(nodes))
-    k, m = brick(edges, modulus, poisson, density, quadratic)
+    edges = np.stack(np.meshgrid(*map(np.diff, lines), indexing="ij"), axis=-1).reshape(-1, 3)
+    kinds, kind = np.unique(np.round(edges, 12), axis=0, return_inverse=True)
+    made = [brick(each, modulus, poisson, density, quadratic) for each in kinds]
     size = 3 * len(nodes)
     dofs = (3 * bricks[:, :, None] + np.arange(3)).reshape(len(bricks), size)
     where = np.repeat(dofs, size, axis=1).ravel(), np.tile(dofs, (1, size)).ravel()
     stiffness, mass = (
-        scipy.sparse.csc_array(scipy.sparse.coo_array((np.tile(e.ravel(), len(bricks)), where)))
-        for e in (k, m)
+        scipy.sparse.csc_array(scipy.sparse.coo_array((np.array(e)[kind.ravel()].ravel(), where)))
+        for e in zip(*made, strict=True)
     )
     rows = np.column_stack(
         [np.repeat(np.arange(1, len(places) + 1), 3), np.tile([1, 2, 3], len(places))]
@@ -87,18 +95,18 @@ def brick(edges, modulus, poisson, density, quadratic=False):
     return stiffness, mass
 
 
-def side(counts, sizes, places, axis, value, quadratic=False):
+def side(places, axis, value, quadratic=False):
     """Nodes (k, 4) and elements of the side of a box, corners in turn and then edges."""
     on_side = np.flatnonzero(np.isclose(places[:, axis], value))
-    ways = [way for way in range(3) if way != axis]
-    edges = np.divide(sizes, counts)[ways]
-    start = np.min(places, axis=0)[ways]
-    tree = {
-        tuple(np.round(2.0 * (places[n, ways] - start) / edges).astype(int)): n for n in on_side
-    }
+    ranks, counts = [], []
+    for way in (way for way in range(3) if way != axis):
+        line, rank = np.unique(np.round(places[on_side, way], 9), return_inverse=True)
+        ranks.append(rank if quadratic else 2 * rank)
+        counts.append((len(line) - 1) // (2 if quadratic else 1))
+    tree = dict(zip(zip(*map(np.ravel, ranks), strict=True), on_side, strict=True))
     around = [(0, 0), (2, 0), (2, 2), (0, 2)]
     around += [(1, 0), (2, 1), (1, 2), (0, 1)] if quadratic else []
-    first = itertools.product(*(range(counts[way]) for way in ways))
+    first = itertools.product(*map(range, counts))
     elements = [[1 + tree[2 * i + a, 2 * j + b] for a, b in around] for i, j in first]
     return np.column_stack([on_side + 1, places[on_side]]), elements
 
@@ -116,9 +124,9 @@ def two_blocks(upper, lower=None, quadratic=False, sizes=SIZES):
     height = sizes[2]
     model, places = box(upper, sizes, quadratic=quadratic)
     on = {"quadratic": quadratic}
-    top, tops = side(upper, sizes, places, 2, height, **on)
-    end, ends = side(upper, sizes, places, 0, sizes[0], **on)
-    face, elements = side(upper, sizes, places, 2, 0.0, **on)
+    top, tops = side(places, 2, height, **on)
+    end, ends = side(places, 0, sizes[0], **on)
+    face, elements = side(places, 2, 0.0, **on)
     press, pull = (jb.face_surface(*a).areas for a in ((top, tops), (end, ends)))
     above = model.condensed(
         face,
@@ -133,6 +141,6 @@ def two_blocks(upper, lower=None, quadratic=False, sizes=SIZES):
         held=lambda places: places[:, 2] == -height,
         quadratic=quadratic,
     )
-    face, elements = side(lower, sizes, places, 2, 0.0, **on)
+    face, elements = side(places, 2, 0.0, **on)
     nothing = [[int(face[0, 0]), 3, 0.0]]
     return above, model.condensed(face, elements=elements, press=[nothing])

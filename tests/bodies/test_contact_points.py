@@ -73,8 +73,8 @@ class TestPressure:
                 quadratic=quadratic,
                 held=lambda places: places[:, 2] == -15.0,
             )
-            face, elements = side(counts, sizes, places, 2, 0.0, quadratic)
-            outer, tops = side(counts, sizes, places, 2, 15.0 + 2.0 * height, quadratic)
+            face, elements = side(places, 2, 0.0, quadratic)
+            outer, tops = side(places, 2, 15.0 + 2.0 * height, quadratic)
             rows = [[int(face[0, 0]), 3, 0.0]]
             if height == 0.0:
                 areas = jb.face_surface(outer, tops).areas
