@@ -131,6 +131,12 @@ class Sticking(NamedTuple):
         soft = face.flexibility[0, 0] + pulled @ face.loads[:, 0]
         return cls(stiffness, inverse, pulled, soft)
 
+    def glued(self, face: Face, load: Array) -> Array:
+        """Displacements (N,) under loads if all points stick, and close their gaps."""
+        points = face.points
+        closing = jnp.zeros((points.gap.size, 3)).at[:, 2].set(-points.springs[:, 1] * points.gap)
+        return self.inverse @ (face.loads @ load + face.on_nodes(closing))
+
     def moved(self, force: Array, driven: Array, pull: Array) -> Array:
         """Displacements (N,) under nodal forces; with the load held in place where it is driven."""
         free = self.inverse @ force

@@ -204,7 +204,8 @@ def _steps(
 ) -> tuple[Steps, Array]:
     """Levels of a path, and the displacement of the load after the pressing.
 
-    The search for a level starts where the last step would lead if it went on.
+    The search for a level starts where the last step would lead if it went on.  That for the first
+    one starts with all gaps closed, because a body on few points is nearly loose.
 
     Parameters
     ----------
@@ -224,6 +225,7 @@ def _steps(
         rests = jnp.all(ahead == 0.0)
         goes_on = jnp.sum(ahead * further) / jnp.maximum(jnp.sum(further**2), TINY)
         guess = before.u + jnp.clip(goes_on, 0.0, 1.0) * moved
+        guess = jnp.where(jnp.all(before.given == 0.0), sticking.glued(face, load), guess)
         points = face.points._replace(friction=rub * face.points.friction)
         own, drive = face._replace(points=points), Drive(load, driven, start)
         found = take_step(own, sticking, before.slip, drive, guess)

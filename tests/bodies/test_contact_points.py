@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from calibration.finite_elements.boxes import box, side, two_blocks
 from jbeamshell.bodies.contact_points import contact_points
-from tests.bodies.bricks import box, side, two_blocks
 
 COARSE, OTHER = (4, 2, 1), (5, 3, 1)
 LOAD = {"friction": 0.25, "bolts": 12e3, "amplitude": 2300.0}

@@ -8,9 +8,9 @@ from scipy.sparse.linalg import eigsh
 
 import jbeamshell as jb
 from calibration.finite_elements.bolted_lap import decks
+from calibration.finite_elements.boxes import box
 from calibration.finite_elements.bricks import run
 from jbeamshell.measured.example import data_folder
-from tests.bodies.bricks import box
 from tests.damaged import damage
 
 LAP = data_folder() / "bolted_lap"

@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.optimize
 
 import jbeamshell as jb
-from tests.bodies.bricks import box
+from calibration.finite_elements.boxes import box
 
 LENGTH, HEIGHT = 60.0, 5.0
 

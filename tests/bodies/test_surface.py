@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from calibration.finite_elements.boxes import box
 from jbeamshell.bodies.surface import matched, spread
-from tests.bodies.bricks import box
 
 SQUARE = np.array([[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0]], float)
 
