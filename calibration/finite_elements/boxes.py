@@ -1,11 +1,18 @@
 """Bricks of a box, of 8 or 20 nodes: stiffness and mass, by points of Gauss."""
 
+from __future__ import annotations
+
 import itertools
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse
 
 import jbeamshell as jb
+
+Places = Callable[[np.ndarray], np.ndarray]
+Model = tuple[jb.StiffnessModel, np.ndarray]
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 POWERS = np.array(list(itertools.product((0, 1), repeat=3)))
@@ -17,21 +24,28 @@ SERENDIPITY = np.array(
 
 
 def box(
-    counts,
-    sizes,
-    at=(0.0, 0.0, 0.0),
-    modulus=210e3,
-    poisson=0.3,
-    density=7.85e-9,
-    held=None,
-    quadratic=False,
-):
+    counts: Sequence[int],
+    sizes: Sequence[float],
+    at: Sequence[float] = (0.0, 0.0, 0.0),
+    modulus: float = 210e3,
+    poisson: float = 0.3,
+    density: float = 7.85e-9,
+    held: Places | None = None,
+    quadratic: bool = False,
+) -> Model:
     """Model of a box of equal bricks, and the places of its nodes, see `on_grid`."""
     lines = [a + np.linspace(0.0, s, n + 1) for a, s, n in zip(at, sizes, counts, strict=True)]
     return on_grid(lines, modulus, poisson, density, held, quadratic)
 
 
-def on_grid(lines, modulus=210e3, poisson=0.3, density=7.85e-9, held=None, quadratic=False):
+def on_grid(
+    lines: Sequence[Any],
+    modulus: float = 210e3,
+    poisson: float = 0.3,
+    density: float = 7.85e-9,
+    held: Places | None = None,
+    quadratic: bool = False,
+) -> Model:
     """Model of bricks between lines along X, Y and Z, and the places (N, 3) of its nodes.
 
     Nodes are numbered from 1.  ``held`` is True for the places that do not move.
@@ -65,7 +79,9 @@ def on_grid(lines, modulus=210e3, poisson=0.3, density=7.85e-9, held=None, quadr
     return jb.StiffnessModel(stiffness[stay][:, stay], rows[stay], mass[stay][:, stay]), places
 
 
-def brick(edges, modulus, poisson, density, quadratic=False):
+def brick(
+    edges: np.ndarray, modulus: float, poisson: float, density: float, quadratic: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and mass (24, 24) of a brick, or (60, 60) with nodes on its edges."""
     shear = modulus / (2.0 * (1.0 + poisson))
     lame = modulus * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
@@ -95,7 +111,9 @@ def brick(edges, modulus, poisson, density, quadratic=False):
     return stiffness, mass
 
 
-def side(places, axis, value, quadratic=False):
+def side(
+    places: np.ndarray, axis: int, value: float, quadratic: bool = False
+) -> tuple[np.ndarray, list[list[int]]]:
     """Nodes (k, 4) and elements of the side of a box, corners in turn and then edges."""
     on_side = np.flatnonzero(np.isclose(places[:, axis], value))
     ranks, counts = [], []
@@ -114,7 +132,12 @@ def side(places, axis, value, quadratic=False):
 SIZES = (60.0, 30.0, 15.0)
 
 
-def two_blocks(upper, lower=None, quadratic=False, sizes=SIZES):
+def two_blocks(
+    upper: Sequence[int],
+    lower: Sequence[int] | None = None,
+    quadratic: bool = False,
+    sizes: Sequence[float] = SIZES,
+) -> tuple[jb.Substructure, jb.Substructure]:
     """Block on another one that is held below, pressed by 1 over its top and pulled at its end.
 
     ``upper`` and ``lower`` are bricks along, across and through each; the lower ones are the upper

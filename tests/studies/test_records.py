@@ -17,6 +17,7 @@ from calibration.studies import brake_reuss, four_parameters
 from calibration.studies import laws_of_a_strip as laws
 from verification import (
     campaign,
+    face_meshes,
     failure_map,
     gradients,
     joints,
@@ -232,6 +233,21 @@ def test_a_row_of_the_slopes():
     loss, _, slopes = plain_slopes.plain(scene, plain_slopes.KEYS)
     assert loss == pytest.approx(row["D"], rel=1e-6)
     assert slopes == pytest.approx(row["slopes"], abs=1e-5)
+
+
+# --- faces ----------------------------------------------------------------------------------------
+
+
+def test_stated_errors_of_a_mesh_mostly_hold_and_are_of_the_size_of_true_ones():
+    record = record_of(face_meshes)
+    for problem in face_meshes.PARTS:
+        rows, found = record[problem]["rows"], record[problem]["summary"]
+        assert found == pytest.approx(face_meshes.summary(rows))
+        # 90 % would take larger factors, which are three to four times too large already.
+        assert found["held"] >= 0.8 * len(rows)
+        assert found["median"] < 5.0
+    punch = [row for row in record["punch"]["rows"] if row["quadratic"] and row["elements"] == 12]
+    assert [row["error"] < 0.02 for row in punch] == [False, True, True]  # one element slips at .3
 
 
 # --- fits -----------------------------------------------------------------------------------------
