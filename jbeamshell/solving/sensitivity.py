@@ -137,7 +137,9 @@ def sensitivity(scene: Scene | History, scatter: float = 0.0) -> Sensitivity:
 
     Examples
     --------
-    >>> found = jb.sensitivity(joint, jb.Bolt("M8", torque="25 N m").scatter)
+    >>> bolted = {"contact.bolts": [[1.0, 20.0, 0.4]], "load.amplitude": 1.0}
+    >>> scene = jb.Scene().replace(bolted)
+    >>> found = jb.sensitivity(scene, jb.Bolt("M8", torque="25 N m").scatter)
     >>> print(found)
     """
     history = scene if isinstance(scene, History) else None
