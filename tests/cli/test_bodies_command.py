@@ -40,7 +40,7 @@ def test_a_face_has_a_loop_and_maps(joint, tmp_path, capsys):
     assert figures["dissipation"] == pytest.approx(abs(area), rel=0.02)
     face = np.genfromtxt(out / "contact.csv", delimiter=",", names=True)
     pressed = face[face["step"] == 0]
-    assert len(pressed) == 91
+    assert len(pressed) == 288
     assert np.sum(pressed["tributary"]) == pytest.approx(1800.0)
     assert np.sum(pressed["normal_force"]) == pytest.approx(16e3)  # of both bolts
 
