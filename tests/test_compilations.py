@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from jbeamshell.contact_line import native
 from jbeamshell.scene.keys import NUMBERS
 
 
@@ -41,6 +42,16 @@ def test_solve_compiles_once_for_all_numbers_of_a_scene(compiled):
         assert history.figures()["dissipation"] > 0.0
     # Single operations, such as the products that make E' of E, are compiled at their first use.
     assert [name for name in compiled() if name.startswith("jit(_")] == []
+
+
+@pytest.mark.skipif(native.library() is None, reason="a walk in JAX is compiled")
+def test_a_plain_call_of_plane_elasticity_compiles_no_program(compiled):
+    scene = jb.Scene()
+    jb.solve(scene).figures()
+    own = {"strip.overhang": 0.7, "contact.bolts": [[0.4, 10.0, 0.3], [1.6, 20.0, 0.3]]}
+    compiled()
+    assert jb.solve(scene.replace(own), throw=False).figures()["dissipation"] > 0.0
+    assert compiled() == []
 
 
 def test_sweeps_share_a_program_whatever_the_scene_s_other_numbers(compiled):

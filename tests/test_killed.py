@@ -23,7 +23,7 @@ TINY = {
 SET = [word for key, value in TINY.items() for word in ("--set", f"{key}={value}")]
 ROOT = str(Path(jb.__file__).parents[1])
 GONE = 10.0  # seconds in which a worker must have noticed that its parent is no more
-FREE = "contact.friction,strip.height_ratio,strip.kappa_s"
+FREE = "contact.friction,strip.height_ratio"
 
 
 def command(*words, folder):

@@ -6,24 +6,21 @@ have no holes.  The plane model has the patch of `jbeamshell.scene.bolts.patch_w
 bolts are mirrored about the middle of the width, so half of them is computed.  Kinematics are
 linear: a preload times ten bears ten times the force, and loses a hundred times the energy.
 
-`python -m calibration.finite_elements.bolt_patch` compares dissipation and secant stiffness.
+`python -m calibration bolt_patch` compares dissipation and secant stiffness.
 """
 
 from __future__ import annotations
 
 import itertools
-import json
 import warnings
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 import scipy.sparse
 
 import jbeamshell as jb
 from calibration.finite_elements.bricks import MODULUS, POISSON, Box, box
-from calibration.provenance import provenance
 
 RECORD = Path(__file__).with_suffix(".json")
 LAP, FREE, THICK = 60.0, 20.0, 8.0  # mm; of the lap, beyond it, of a plate
@@ -136,7 +133,7 @@ def bodies(width: float, along: int, through: int) -> tuple[jb.Substructure, jb.
     return found[0], found[1]
 
 
-def measure(along: int = ALONG, through: int = THROUGH) -> list[dict[str, Any]]:
+def measure(along: int = ALONG, through: int = THROUGH) -> dict[str, Any]:
     """Energy of a cycle and secant stiffness of the whole joint, over width and load."""
     rows = []
     for width in WIDTHS:
@@ -158,8 +155,7 @@ def measure(along: int = ALONG, through: int = THROUGH) -> list[dict[str, Any]]:
                 "mesh_error": float(history.mesh_error),
             }
             rows.append({"width": width, "load": load, "bricks": [along, through]} | figures)
-            print(tell(rows[-1:]), flush=True)
-    return rows
+    return {"bolt": str(BOLT), "rows": rows}
 
 
 def plane(width: float, load: float, patch: float = BOLT.patch) -> jb.History:
@@ -194,10 +190,10 @@ def beside(row: dict[str, Any], patch: float = BOLT.patch) -> tuple[float, float
     return energy, stiffness
 
 
-def tell(rows: list[dict[str, Any]]) -> str:
+def tell(record: dict[str, Any]) -> str:
     """Table of the differences."""
     lines = []
-    for row in rows:
+    for row in record["rows"]:
         energy, stiffness = beside(row)
         words = f"{row['width']:4.0f} mm wide, {row['load']:.1f} of gross slip, {row['bricks']}:"
         lines.append(
@@ -205,14 +201,3 @@ def tell(rows: list[dict[str, Any]]) -> str:
             f"leaves {row['mesh_error']:.1%}"
         )
     return "\n".join(lines)
-
-
-def main() -> None:
-    """Compare, print and record."""
-    jax.config.update("jax_enable_x64", True)
-    record = {"provenance": provenance(), "bolt": str(BOLT), "rows": measure()}
-    RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

@@ -44,7 +44,8 @@ def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
     concrete = contextlib.nullcontext() if traced else jax.ensure_compile_time_eval()
     try:
         with concrete:
-            return jnp.asarray(value, dtype=jnp.result_type(float))
+            made = value if traced else np.asarray(value, jnp.result_type(float))
+            return jnp.asarray(made, dtype=jnp.result_type(float))
     except (ValueError, OverflowError):  # rows of different length; whole numbers beyond any float
         raise InputError(f"{key} = {shown(value)}: {fix}") from None
 
@@ -53,7 +54,7 @@ def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
 def _leaf_of(value: float, sign: float, dtype: Any, device: Any) -> Array:
     """Leaf of a number; JAX takes longer to make one than most checks do."""
     with jax.ensure_compile_time_eval():
-        return jnp.asarray(value, dtype=dtype)
+        return jnp.asarray(np.asarray(value, dtype))  # of a plain number JAX compiles it
 
 
 def is_numeric(value: Any) -> bool:

@@ -1,20 +1,74 @@
-"""NumPy or JAX's, by the arrays that are given."""
+"""NumPy or JAX, by the arrays that are given.
+
+What is found once for a scene takes JAX a second to compile and NumPy some milliseconds.  Code that
+takes its functions from `numbers_of` (``xp``, the usual name) runs in both: in JAX within a
+transformation, in NumPy elsewhere.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import lax
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 
-def numbers_of(array: object) -> Any:
-    """NumPy for its arrays, which compile nothing, and `jax.numpy` for those of JAX."""
-    return np if isinstance(array, np.ndarray | np.generic) else jnp
+def numbers_of(*values: object) -> Any:
+    """Module of array functions: `jax.numpy` if any array of some pytrees is JAX's, else NumPy."""
+    if all(isinstance(value, np.ndarray | np.generic) for value in values):  # soon known
+        return np
+    return jnp if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(values)) else np
+
+
+def put(array: Any, place: Any, values: Any) -> Any:
+    """Copy of an array with values at a place, an index."""
+    if numbers_of(array, values) is jnp:
+        return jnp.asarray(array).at[place].set(values)
+    copy = np.array(array)
+    copy[place] = values
+    return copy
+
+
+def scan(
+    step: Callable[[Any, Any], tuple[Any, Any]], carry: Any, inputs: Any, *, reverse: bool = False
+) -> tuple[Any, Any]:
+    """Last carry of a loop over inputs, and what its steps gave, stacked; see `jax.lax.scan`.
+
+    Parameters
+    ----------
+    step : function of the carry and of one input, which returns the next carry and what is stacked
+    carry, inputs : pytrees, the latter of arrays (steps, ...)
+    reverse : True to start with the last input
+    """
+    if numbers_of(carry, inputs) is jnp:
+        return lax.scan(step, carry, inputs, reverse=reverse)
+    leaves, tree = jax.tree.flatten(inputs)
+    order, made = range(len(leaves[0])), []
+    for i in reversed(order) if reverse else order:
+        carry, out = step(carry, jax.tree.unflatten(tree, [leaf[i] for leaf in leaves]))
+        made.append(out)
+    return carry, jax.tree.map(lambda *parts: np.stack(parts), *(made[::-1] if reverse else made))
+
+
+def while_loop(unfinished: Callable[[Any], Any], step: Callable[[Any], Any], start: Any) -> Any:
+    """What a loop ends with; see `jax.lax.while_loop`."""
+    if numbers_of(start) is jnp:
+        return lax.while_loop(unfinished, step, start)
+    while unfinished(start):
+        start = step(start)
+    return start
+
+
+def without_slopes(values: T) -> T:
+    """Pytree of numbers whose derivatives are zero; see `jax.lax.stop_gradient`."""
+    return values if numbers_of(values) is np else jax.tree.map(lax.stop_gradient, values)
 
 
 def quiet(function: Callable[P, R]) -> Callable[P, R]:

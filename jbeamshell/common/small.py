@@ -11,6 +11,7 @@ import jax
 import numpy as np
 
 from jbeamshell.common.checks import is_staged
+from jbeamshell.common.numbers_of import numbers_of
 
 QUICK = {"xla_cpu_use_fusion_emitters": False}
 LEVEL = "xla_backend_optimization_level"
@@ -48,6 +49,11 @@ def _is_known(name: str, value: Any) -> bool:
     return True
 
 
+def always(_: object) -> bool:
+    """True: what NumPy computes for all its arrays."""
+    return True
+
+
 class Small:
     """Function that is compiled as a small program where all its arrays are numbers.
 
@@ -58,18 +64,27 @@ class Small:
     ----------
     function : function of a pytree of arrays and of further arguments, which are static
     level : see `quick_options`
+    by_numpy : True for what NumPy computes without a program, if all its arrays are NumPy's
     """
 
-    def __init__(self, function: Callable[..., Any], level: int = 1) -> None:
-        self._function, self._level = function, level
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        level: int = 1,
+        by_numpy: Callable[[Any], bool] = lambda _: False,
+    ) -> None:
+        self._function, self._level, self._by_numpy = function, level, by_numpy
         self._inside = eqx.filter_jit(function)
 
     def __call__(self, given: Any, *static: Hashable) -> Any:
         """Value of the function."""
         leaves, tree = jax.tree.flatten(given)
-        if is_staged() or not all(map(_is_number, leaves)):
-            return self._inside(given, *static)
-        return self._quick(leaves, tree, static)
+        if not is_staged():
+            if numbers_of(*leaves) is np and self._by_numpy(given):
+                return self._function(given, *static)
+            if all(map(_is_number, leaves)):
+                return self._quick(leaves, tree, static)
+        return self._inside(given, *static)
 
     @functools.cached_property
     def _quick(self) -> Any:
@@ -81,4 +96,6 @@ class Small:
 
 
 def _is_number(leaf: Any) -> bool:
-    return isinstance(leaf, np.ndarray | jax.Array) and not isinstance(leaf, jax.core.Tracer)
+    return isinstance(leaf, np.ndarray | np.generic | jax.Array) and not isinstance(
+        leaf, jax.core.Tracer
+    )

@@ -27,15 +27,14 @@ def on_one_core(function: Callable[P, R]) -> Callable[P, R]:
     """Function that runs on the processor, during which LAPACK has one thread.
 
     A device that ``jax.default_device`` or `PLATFORMS` names stays, and so does the number of
-    threads that `VARIABLE` says.
+    threads that `VARIABLE` says.  NumPy does not read that once it is there.
     """
 
     @functools.wraps(function)
     def limited(*args: P.args, **options: P.kwargs) -> R:
         with _processor():
-            if os.environ.get(VARIABLE):
-                return function(*args, **options)
-            with _lapack().limit(limits=1):
+            said = os.environ.get(VARIABLE, "")
+            with _lapack().limit(limits=int(said) if said.isdigit() else 1):
                 return function(*args, **options)
 
     return limited
@@ -60,7 +59,7 @@ def _processor() -> contextlib.AbstractContextManager[object]:
 
 @functools.cache
 def _lapack() -> ThreadpoolController:
-    """Controller of the library that JAX calls on a CPU, which is SciPy's."""
+    """Controller of the libraries of NumPy and of SciPy; JAX calls the latter on a CPU."""
     import scipy.linalg.lapack  # noqa: F401  (loads the library)
 
     return ThreadpoolController().select(user_api="blas")

@@ -10,14 +10,15 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.numbers_of import numbers_of, put
 from jbeamshell.common.precision import rounded
 from jbeamshell.common.pytrees import Tree
-from jbeamshell.common.small import Small
+from jbeamshell.common.small import Small, always
 from jbeamshell.contact_line.strip import Strip, moved_by
 from jbeamshell.history.record import Above
 from jbeamshell.mechanics.kinematics import Strains
@@ -68,10 +69,11 @@ class Unread(Tree):
         return above
 
 
-@Small
+@functools.partial(Small, by_numpy=always)
 def _above(inputs: tuple[Strip, Movement]) -> Above:
     """Fields above the contact line at every step."""
     strip, movement = inputs
+    xp = numbers_of(inputs)
     # The pressed strip, and what the load adds to it.
     pressed = moved_by(strip.pressed, movement.at_rest[None])
     loaded = moved_by(strip.loaded, movement.change)
@@ -86,7 +88,7 @@ def _above(inputs: tuple[Strip, Movement]) -> Above:
         return nan_unless(movement.sound, values)
 
     return Above(
-        fields=masked(jnp.concatenate([moved[:2].T, further], axis=-1)),
+        fields=masked(xp.concatenate([moved[:2].T, further], axis=-1)),
         sections=jax.tree.map(masked, sections),
         member=None if below is None else masked(_seen_from_above(strip, below)),
     )
@@ -95,10 +97,11 @@ def _above(inputs: tuple[Strip, Movement]) -> Above:
 def _seen_from_above(strip: Strip, moved: Array) -> Array:
     """Fields v, w, beta, psi, ... (steps, n, k) of the member below, as the strip sees them."""
     assert strip.loaded.pair is not None
-    further = jnp.tensordot(strip.loaded.pair.form.further, moved, 1)
-    signs = jnp.asarray([1.0, -1.0, -1.0])  # w and beta count the other way from below
-    fields = jnp.concatenate([moved[:2], further])
-    return fields.at[:3].multiply(signs[:, None, None]).T
+    xp = numbers_of(strip, moved)
+    further = xp.tensordot(strip.loaded.pair.form.further, moved, 1)
+    signs = np.array([1.0, -1.0, -1.0])  # w and beta count the other way from below
+    fields = xp.concatenate([moved[:2], further])
+    return put(fields, slice(3), signs[:, None, None] * fields[:3]).T
 
 
 def _sections(strip: Strip, moved: Array) -> tuple[Array, Strains]:
@@ -108,13 +111,13 @@ def _sections(strip: Strip, moved: Array) -> tuple[Array, Strains]:
     ----------
     moved : fields (m, n, steps) of the section's form
     """
-    form = strip.form
+    xp, form = numbers_of(strip, moved), strip.form
     values, slopes = form.modes[:, 0], form.modes[:, 1]
     on_mean = values @ form.values + slopes @ form.mixed.T
     on_slope = values @ form.mixed + slopes @ form.slopes
-    rows = jnp.concatenate([on_mean, on_slope, form.further])
-    parts = jnp.moveaxis(jnp.tensordot(rows, moved, 1), 2, 1)  # (rows, steps, n)
-    mean, slope, further = jnp.split(parts, [len(on_mean), 2 * len(on_mean)])
-    between = jnp.diff(slope, axis=2) / jnp.diff(strip.x)
+    rows = xp.concatenate([on_mean, on_slope, form.further])
+    parts = xp.moveaxis(xp.tensordot(rows, moved, 1), 2, 1)  # (rows, steps, n)
+    mean, slope, further = xp.split(parts, [len(on_mean), 2 * len(on_mean)])
+    between = xp.diff(slope, axis=2) / xp.diff(strip.x)
     forces = 0.5 * (mean[..., 1:] + mean[..., :-1]) + between
-    return jnp.moveaxis(further, 0, 2), Strains(*forces)
+    return xp.moveaxis(further, 0, 2), Strains(*forces)

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.numbers_of import without_slopes
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.walk import walk
@@ -59,7 +60,7 @@ def press_roughly(
     friction : mu
     gap : (n,) distance of the nodes before anything presses; None is none
     """
-    zero, even = jnp.zeros_like(press_n), jax.lax.stop_gradient(FIRST * jnp.mean(press_n))
+    zero, even = 0.0 * press_n, without_slopes(FIRST * press_n.mean())
     body = Body(
         x=zero,
         tributary=zero,
@@ -69,14 +70,14 @@ def press_roughly(
         f_t=-press_t,
         f_n=even - press_n,
         r_0=even + zero,
-        t_0=jnp.zeros_like(press_t),
-        c=jnp.ones_like(friction),
+        t_0=0.0 * press_t,
+        c=0.0 * friction + 1.0,
     )
     if gap is not None:
         closed = body.f_t + k_tn @ gap, body.f_n + k_nn @ gap
         body = eqx.tree_at(lambda b: (b.f_t, b.f_n), body, closed)
-    once = jnp.ones(1, bool)
-    levels = walk(body, friction, pressed(body), jnp.ones_like(press_n[:1]), once)
+    at_once = 0.0 * press_n[:1] + 1.0
+    levels = walk(body, friction, pressed(body), at_once, np.ones(1, bool))
     first = jax.tree.map(lambda part: part[0], (levels.state, levels.lift))
     at, lift = nan_unless(levels.settled[0], first)
     return Assembly(lift, at.v, at.r_n, at.r_t)

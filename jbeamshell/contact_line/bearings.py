@@ -12,10 +12,10 @@ line serve bearings too.
 from __future__ import annotations
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.contact_line.body import Body
 
 WAYS = np.array([1.0, -1.0])  # of the slip that closes each gap
@@ -30,7 +30,7 @@ def with_bearings(body: Body, stiffness: Array, share: Array) -> Body:
     stiffness : of all bearings together, force per width and length
     share : (k,) share of each node in the mean slip of the bolts
     """
-    slip = share[:, None] * WAYS
+    xp, slip = numbers_of(body, stiffness, share), share[:, None] * WAYS
     n, ways = body.r_0.size, len(WAYS)
     beside = ((0, ways), (0, ways))
     return eqx.tree_at(
@@ -38,19 +38,19 @@ def with_bearings(body: Body, stiffness: Array, share: Array) -> Body:
         body,
         (
             body.K_tt + stiffness * slip @ slip.T,
-            jnp.concatenate([body.K_tn, stiffness * slip], axis=1),
-            jnp.pad(body.K_nn, beside) + jnp.diag(jnp.pad(stiffness * WAYS**2, (n, 0))),
-            jnp.pad(body.f_n, (0, ways)),
-            jnp.pad(body.r_0, (0, ways)),
+            xp.concatenate([body.K_tn, stiffness * slip], axis=1),
+            xp.pad(body.K_nn, beside) + xp.diag(xp.pad(stiffness * WAYS**2, (n, 0))),
+            xp.pad(body.f_n, (0, ways)),
+            xp.pad(body.r_0, (0, ways)),
         ),
     )
 
 
 def with_gaps(lift: Array, clearance: Array | float) -> Array:
     """Lift (n + 2,) under the pressures with the openings of the gaps; see `with_bearings`."""
-    return jnp.append(lift, clearance * WAYS**2)
+    return numbers_of(lift, clearance).append(lift, clearance * WAYS**2)
 
 
 def bearing_energy(stiffness: Array, reaction: Array) -> Array:
     """Energy (...) of the bearings under their reactions (..., 2)."""
-    return 0.5 * jnp.sum(reaction**2, axis=-1) / stiffness
+    return 0.5 * numbers_of(reaction).sum(reaction**2, axis=-1) / stiffness

@@ -13,12 +13,13 @@ as unknowns these two would have to cancel, and round-off would grow.
 from __future__ import annotations
 
 import itertools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
+from jax.typing import ArrayLike
 
+from jbeamshell.common.numbers_of import numbers_of, put, scan
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.contact_line.ends import End
 from jbeamshell.mechanics.section_form import Matrices, SectionForm
@@ -94,7 +95,8 @@ class Elimination(NamedTuple):
 
     def recovered(self, factors: Array) -> Array:
         """Fields (n, m-2, levels) from factors (2n+2, levels) of v, w, end load and pressure."""
-        factors = jnp.concatenate([factors[:-1], self.sizes[:, None] * factors[-1:]])
+        xp = numbers_of(self, factors)
+        factors = xp.concatenate([factors[:-1], self.sizes[:, None] * factors[-1:]])
 
         def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
             inverse, sides, onwards = station
@@ -103,9 +105,9 @@ class Elimination(NamedTuple):
 
         last = self.last @ factors
         stations = (self.inverse, self.sides @ factors, self.onwards)
-        second, inner = lax.scan(back, last, stations, reverse=True)
+        second, inner = scan(back, last, stations, reverse=True)
         first = self.first[0] @ factors + self.first[1] @ second
-        return jnp.concatenate([first[None], inner, last[None]])
+        return xp.concatenate([first[None], inner, last[None]])
 
 
 class Unknown(NamedTuple):
@@ -116,12 +118,12 @@ class Unknown(NamedTuple):
     nothing : (n, m-2, 0) no values: the shape alone says for which fields
     """
 
-    nothing: Array
+    nothing: Array | np.ndarray
 
     @classmethod
     def of(cls, nodes: int, fields: int) -> Unknown:
         """Elimination of a body of so many nodes whose form has so many fields."""
-        return cls(jnp.zeros((nodes, fields - 2, 0)))
+        return cls(np.zeros((nodes, fields - 2, 0)))
 
     @property
     def forgotten(self) -> Unknown:
@@ -135,7 +137,8 @@ class Unknown(NamedTuple):
 
     def recovered(self, factors: Array) -> Array:
         """Fields (n, m-2, levels), see `Elimination.recovered`."""
-        return jnp.full((*self.nothing.shape[:-1], factors.shape[1]), jnp.nan)
+        none: Any = np.full((*self.nothing.shape[:-1], factors.shape[1]), np.nan)
+        return none
 
 
 class Line(NamedTuple):
@@ -163,7 +166,7 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         caller
     last : conditions at the last station of each strip
     """
-    n, count = x.size, 1 + loads.shape[1]
+    xp, n, count = numbers_of(form, x, loads), x.size, 1 + loads.shape[1]
     columns = 2 * n + count
 
     def go(
@@ -172,36 +175,36 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         before, forces = carry
         i, load, length, start, across = station
         stays, follows = form.moved(length)
-        forces = forces + _in_last_columns(form.press[2:, None] * load, forces)
-        contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
+        forces = _add(forces, form.press[2:, None] * load, -loads.shape[1])
+        contacts = xp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
         inverse = inverse_cholesky(before + start[2:, 2:])
         sides = inverse @ _add(forces, contacts, 2 * i)
         onwards = inverse @ (before + stays.T[2:, 2:])
-        contacts = jnp.concatenate([stays[2:, :2], follows[2:, :2]], axis=1)
+        contacts = xp.concatenate([stays[2:, :2], follows[2:, :2]], axis=1)
         forces = _add(forces - onwards.T @ sides, contacts, 2 * i)
         whole = (stays + follows)[2:, 2:]
         return (before + whole - onwards.T @ onwards, forces), (inverse, sides, onwards)
 
-    lengths = jnp.diff(x)
+    lengths = xp.diff(x)
     start, end, across = form.element(lengths)
     carry, first, hessian = _begin(form, (start[0], end[0], across[0]), loads[0], far)
     hessian, parts = _wider(_wider(hessian, columns, count).T, columns, count), []
-    stations = (jnp.arange(1, n - 1), loads[1:-1], lengths[1:], start[1:], across[1:])
+    stations = (xp.arange(1, n - 1), loads[1:-1], lengths[1:], start[1:], across[1:])
     # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
     several = PARTS if n > FEW else 1
     for begin, stop in itertools.pairwise(np.linspace(0, n - 2, several + 1).astype(int)):
         carry = carry[0], _wider(carry[1], 2 * stop + 4 + count, count)
-        carry, part = lax.scan(go, carry, tuple(values[begin:stop] for values in stations))
+        carry, part = scan(go, carry, tuple(values[begin:stop] for values in stations))
         parts.append(part)
         hessian = hessian - _products(part[1], columns, count)
     inverse, sides, onwards = (
-        jnp.concatenate([part[0] for part in parts]),
-        jnp.concatenate([_wider(part[1], columns, count) for part in parts]),
-        jnp.concatenate([part[2] for part in parts]),
+        xp.concatenate([part[0] for part in parts]),
+        xp.concatenate([_wider(part[1], columns, count) for part in parts]),
+        xp.concatenate([part[2] for part in parts]),
     )
     first = _wider(first[0], columns, count), first[1]
     hessian = hessian + _contacts(form, (start, end, across), loads)
-    sizes = jnp.ones(loads.shape[1], x.dtype)
+    sizes = xp.ones(loads.shape[1], x.dtype)
     ends = [_finish(form, loads[-1], carry, end) for end in last]
     return tuple(
         Line(Elimination(inverse, sides, onwards, first, fields, sizes), hessian + change)
@@ -226,11 +229,11 @@ def _begin(
     hessian : (5 + p, 5 + p) of the energy of the first station's fields in the sides
     """
     start, end, across = element
-    none = jnp.zeros_like(start[:, :1])
+    xp, none = numbers_of(start, load), 0.0 * start[:, :1]
     forces = [none, none, across[:, :2], none, load * form.press[:, None]]
-    fields, back, hessian = _of_end(start, jnp.concatenate(forces, axis=1), far, 0)
+    fields, back, hessian = _of_end(start, xp.concatenate(forces, axis=1), far, 0)
     onwards = back.T @ across[:, 2:]
-    sides = across.T @ fields + jnp.pad(end[:, :2], ((0, 0), (2, 1 + load.size)))
+    sides = across.T @ fields + xp.pad(end[:, :2], ((0, 0), (2, 1 + load.size)))
     carry = end[2:, 2:] - onwards.T @ onwards, sides[2:]
     return carry, (fields[2:], -(back @ onwards)[2:]), hessian
 
@@ -245,13 +248,14 @@ def _finish(
     last : (m-2, 2n+1+p) its fields from the sides
     hessian : (2n+1+p, 2n+1+p) of the energy of its fields in the sides
     """
-    before, sides = (jnp.pad(part, ((2, 0), (0, 0))) for part in carry)
-    ends = jnp.column_stack([-loaded.pull, form.press[:, None] * load])
+    xp = numbers_of(carry, loaded)
+    before, sides = (xp.pad(part, ((2, 0), (0, 0))) for part in carry)
+    ends = xp.column_stack([-loaded.pull, form.press[:, None] * load])
     count = ends.shape[1]
-    forces = sides + _in_last_columns(ends, sides)
-    before = jnp.pad(before, ((0, 0), (2, 0)))
+    forces = _add(sides, ends, -count)
+    before = xp.pad(before, ((0, 0), (2, 0)))
     fields, _, hessian = _of_end(before, forces, loaded, sides.shape[1] - count - 2)
-    return fields[2:], hessian.at[-count, -count].add(-loaded.softness)
+    return fields[2:], put(hessian, (-count, -count), hessian[-count, -count] - loaded.softness)
 
 
 def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Array, Array, Array]:
@@ -270,9 +274,9 @@ def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Arra
     back : (m, k) inverse factor of its free fields' stiffness
     hessian : (sides, sides) of the energy in the sides
     """
-    contact, free = end.span[:, :2], end.span[:, 2:]
+    xp, contact, free = numbers_of(stiffness, end), end.span[:, :2], end.span[:, 2:]
     whole = stiffness + end.stiffness
-    contacts = jnp.pad(contact, ((0, 0), (place, forces.shape[1] - 2 - place)))
+    contacts = xp.pad(contact, ((0, 0), (place, forces.shape[1] - 2 - place)))
     back = free @ inverse_cholesky(free.T @ whole @ free).T
     reduced = back.T @ (forces + whole @ contacts)
     hessian = contacts.T @ forces
@@ -280,21 +284,23 @@ def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Arra
     return contacts - back @ reduced, back, hessian
 
 
-def _add(sides: Array, block: Array, column: Array) -> Array:
-    """Sum of sides and a block (rows, 4) at four of their columns."""
+def _add(sides: Array, block: Array, column: ArrayLike) -> Array:
+    """Sum of sides and a block (rows, k) at some of their columns; -k stands for the last ones."""
+    if numbers_of(sides, block) is np:
+        total: Any = np.array(sides)
+        total[:, np.arange(block.shape[1]) + column] += block
+        return total
     old = lax.dynamic_slice(sides, (0, column), block.shape)
     return lax.dynamic_update_slice(sides, old + block, (0, column))
 
 
-def _in_last_columns(values: Array, sides: Array) -> Array:
-    """Sides with values in their last columns and zeros elsewhere."""
-    return jnp.pad(values, ((0, 0), (sides.shape[1] - values.shape[1], 0)))
-
-
 def _wider(sides: Array, columns: int, count: int) -> Array:
     """Sides with empty columns before the last ones, so many loads'."""
+    if columns == sides.shape[-1]:
+        return sides
     empty = [(0, 0)] * (sides.ndim - 1) + [(0, columns - sides.shape[-1])]
-    return jnp.concatenate([jnp.pad(sides[..., :-count], empty), sides[..., -count:]], axis=-1)
+    xp = numbers_of(sides)
+    return xp.concatenate([xp.pad(sides[..., :-count], empty), sides[..., -count:]], axis=-1)
 
 
 def _contacts(form: SectionForm, elements: Matrices, loads: Array) -> Array:
@@ -302,20 +308,20 @@ def _contacts(form: SectionForm, elements: Matrices, loads: Array) -> Array:
 
     The parts of the fields of both ends are left out, which have conditions of their own.
     """
-    n, dtype = loads.shape[0], loads.dtype
+    xp, n, dtype = numbers_of(form, loads), loads.shape[0], loads.dtype
     start, end, across = (part[:, :2, :2] for part in elements)
     inner = (np.arange(n) > 0) & (np.arange(n) < n - 1)
-    start, across = (jnp.where(inner[:-1, None, None], part, 0.0) for part in (start, across))
-    diagonal = jnp.pad(start, ((0, 1), (0, 0), (0, 0))) + jnp.pad(end, ((1, 0), (0, 0), (0, 0)))
-    coupling = jnp.pad(across, ((0, 1), (0, 0), (0, 0)))
+    start, across = (xp.where(inner[:-1, None, None], part, 0.0) for part in (start, across))
+    diagonal = xp.pad(start, ((0, 1), (0, 0), (0, 0))) + xp.pad(end, ((1, 0), (0, 0), (0, 0)))
+    coupling = xp.pad(across, ((0, 1), (0, 0), (0, 0)))
     here, following = (np.eye(n, k=k)[..., None, None] for k in (0, 1))
     blocks = here * diagonal[:, None] + following * coupling[:, None]
-    blocks = blocks + np.swapaxes(following, 0, 1) * jnp.swapaxes(coupling, 1, 2)
-    stiffness = jnp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n)
-    inner_loads = jnp.where(inner[:, None], loads, 0.0)
+    blocks = blocks + np.swapaxes(following, 0, 1) * xp.swapaxes(coupling, 1, 2)
+    stiffness = xp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n)
+    inner_loads = xp.where(inner[:, None], loads, 0.0)
     press = (inner_loads[:, None] * form.press[:2, None]).reshape(2 * n, -1)
-    sides = jnp.column_stack([jnp.zeros(2 * n, dtype), press])
-    return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((sides.shape[1],) * 2, dtype)]])
+    sides = xp.column_stack([xp.zeros(2 * n, dtype), press])
+    return xp.block([[stiffness, sides], [sides.T, xp.zeros((sides.shape[1],) * 2, dtype)]])
 
 
 def _products(sides: Array, columns: int, count: int) -> Array:
@@ -334,6 +340,6 @@ def local_compliance(stiffness: Array, pull: Array) -> Array:
     stiffness : (fields,) diagonal of the stiffness
     pull : (fields,) part of the load that each clamped contact field carries
     """
-    square = pull**2
-    whole = jnp.sum(square * stiffness)
-    return jnp.sum(square) / jnp.where(whole > 0.0, whole, 1.0)
+    xp, square = numbers_of(stiffness, pull), pull**2
+    whole = xp.sum(square * stiffness)
+    return xp.sum(square) / xp.where(whole > 0.0, whole, 1.0)

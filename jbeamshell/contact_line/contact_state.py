@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
 from jax import Array
 
 from jbeamshell.contact_line.body import Body
@@ -22,5 +21,4 @@ class ContactState(NamedTuple):
 
 def pressed(body: Body) -> ContactState:
     """Contact under the pressures alone."""
-    zero = jnp.zeros_like(body.f_t)
-    return ContactState(zero, body.t_0, body.r_0, body.c * 0.0, body.c * 0.0)
+    return ContactState(0.0 * body.f_t, body.t_0, body.r_0, body.c * 0.0, body.c * 0.0)

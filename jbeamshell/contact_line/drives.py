@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import equinox as eqx
-import jax.numpy as jnp
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.contact_line.body import Body, local_compliance
 from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.numerics.factors import inverse_cholesky
@@ -32,16 +32,16 @@ def driven_by_displacement(body: Body) -> Body:
     displacement it has.  See `exchanged` for its states.  A load that acts on the contact itself,
     where c is zero, acts through a spring that is `STIFF` times as stiff as the contact.
     """
-    f_t, f_n = body.f_t, body.f_n
-    stiffness = jnp.append(jnp.diag(body.K_tt), jnp.diag(body.K_nn))
-    c = jnp.maximum(body.c, local_compliance(stiffness, jnp.append(f_t, f_n)) / STIFF)
+    xp, f_t, f_n = numbers_of(body), body.f_t, body.f_n
+    stiffness = xp.append(xp.diag(body.K_tt), xp.diag(body.K_nn))
+    c = xp.maximum(body.c, local_compliance(stiffness, xp.append(f_t, f_n)) / STIFF)
     return eqx.tree_at(
         lambda b: (b.K_tt, b.K_tn, b.K_nn, b.f_t, b.f_n, b.c),
         body,
         (
-            body.K_tt + jnp.outer(f_t, f_t) / c,
-            body.K_tn + jnp.outer(f_t, f_n) / c,
-            body.K_nn + jnp.outer(f_n, f_n) / c,
+            body.K_tt + xp.outer(f_t, f_t) / c,
+            body.K_tn + xp.outer(f_t, f_n) / c,
+            body.K_nn + xp.outer(f_n, f_n) / c,
             f_t / c,
             f_n / c,
             -1.0 / c,
@@ -69,15 +69,20 @@ class Springs(NamedTuple):
     body: Body
 
     def slip(self, plastic: Array, lift: Array, force: Array) -> Array:
-        """Tangential displacement v (k,) from the plastic slip (k,), the lift (n,) and the load."""
+        """Tangential displacements v (..., k) at loads (...).
+
+        Parameters
+        ----------
+        plastic, lift : (..., k) plastic slip and (..., n) lift
+        """
         body = self.body
-        pull = self.stiffness * plastic - body.K_tn @ lift + body.f_t * force
-        return self.flexibility @ pull
+        pull = self.stiffness * plastic - lift @ body.K_tn.T + force[..., None] * body.f_t
+        return pull @ self.flexibility
 
 
 def spring_energy(stiffness: Array, r_t: Array) -> Array:
     """Energy (...) in springs of a stiffness (k,) under the tangential forces (..., k)."""
-    return 0.5 * jnp.sum(r_t**2 / stiffness, axis=-1)
+    return 0.5 * numbers_of(stiffness, r_t).sum(r_t**2 / stiffness, axis=-1)
 
 
 def with_springs(body: Body, stiffness: Array) -> tuple[Body, Springs]:
@@ -99,7 +104,7 @@ def with_springs(body: Body, stiffness: Array) -> tuple[Body, Springs]:
     -------
     body, springs : with the plastic slip for v, and what finds v again
     """
-    inverse = inverse_cholesky(body.K_tt + jnp.diag(stiffness))
+    inverse = inverse_cholesky(body.K_tt + numbers_of(stiffness).diag(stiffness))
     flexibility = inverse.T @ inverse
     lifted, pulled = flexibility @ body.K_tn, flexibility @ body.f_t
     # D - D (K + D)^-1 D without the difference of two large matrices where the springs are stiff.

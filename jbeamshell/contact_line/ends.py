@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of, scan
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky, solve
 
@@ -53,7 +53,7 @@ class End(NamedTuple):
 
     def among(self, moving: np.ndarray) -> End:
         """End of a section that has more fields, of which those that are True (m,) move here."""
-        whole = jnp.eye(moving.size, dtype=self.pull.dtype)
+        whole = numbers_of(self.pull).eye(moving.size, dtype=self.pull.dtype)
         fields = whole[:, moving]
         stiffness, pull = fields @ self.stiffness @ fields.T, fields @ self.pull
         return self._replace(span=whole, stiffness=stiffness, pull=pull)
@@ -71,8 +71,8 @@ def end_section(
     level : True if it keeps its height everywhere
     on_contact : False for the outer end of a length beyond the contact
     """
-    size, dtype = form.pull.size, form.pull.dtype
-    unit = jnp.eye(size, dtype=dtype)
+    xp, size, dtype = numbers_of(form.pull), form.pull.size, form.pull.dtype
+    unit = xp.eye(size, dtype=dtype)
     shift, turn = form.modes[0, 1], form.modes[2, 1]  # fields that are a unit strain as slopes
     columns: list[Array] = []
     if along in ("face", "guided"):
@@ -86,8 +86,8 @@ def end_section(
     places = np.arange(size)
     kept = (form.held & (along == "free")) | (~form.held & (not level))
     columns += [unit[place] for place in places[kept & (places > 1)]]
-    span = jnp.stack(columns, axis=1) if columns else jnp.zeros((size, 0), dtype)
-    return End(span, jnp.zeros((size, size), dtype), form.pull, jnp.zeros((), dtype))
+    span = xp.stack(columns, axis=1) if columns else xp.zeros((size, 0), dtype)
+    return End(span, xp.zeros((size, size), dtype), form.pull, xp.zeros((), dtype))
 
 
 def beyond(form: SectionForm, lengths: Array, outer: End, forwards: bool) -> End:
@@ -101,15 +101,15 @@ def beyond(form: SectionForm, lengths: Array, outer: End, forwards: bool) -> End
     forwards : True if the length goes on towards greater X
     """
     near, far, between = _long(form, lengths[-1], forwards)
-    first = near, jnp.zeros_like(outer.pull), outer.softness
+    first = near, 0.0 * outer.pull, outer.softness
     if outer.span.shape[1]:  # something moves there
         inverse = inverse_cholesky(outer.span.T @ (far + outer.stiffness) @ outer.span)
         onto, moved = inverse @ (outer.span.T @ between), inverse @ (outer.span.T @ outer.pull)
         first = near - onto.T @ onto, -onto.T @ moved, outer.softness + moved @ moved
 
-    def inwards(now: Three, length: Array) -> tuple[Three, None]:
+    def inwards(now: Three, element: Three) -> tuple[Three, None]:
         stiffness, pull, softness = now  # of the far section; unknown are the steps to it
-        start, end, _ = (part[0] for part in form.element(length[None]))
+        length, start, end = element
         stays, follows = form.moved(length)
         far, step = (end, follows.T) if forwards else (start, stays.T)
         inverse = inverse_cholesky(far + stiffness)
@@ -117,7 +117,8 @@ def beyond(form: SectionForm, lengths: Array, outer: End, forwards: bool) -> End
         left = stays + follows + stiffness - onto.T @ onto
         return (left, pull - onto.T @ moved, softness + moved @ moved), None
 
-    (stiffness, pull, softness), _ = lax.scan(inwards, first, lengths[:-1], reverse=True)
+    others = lengths[:-1], *form.element(lengths[:-1])[:2]
+    (stiffness, pull, softness), _ = scan(inwards, first, others, reverse=True)
     return end_section(form)._replace(stiffness=stiffness, pull=pull, softness=softness)
 
 
@@ -125,13 +126,13 @@ def _long(form: SectionForm, length: Array, forwards: bool) -> Three:
     """Stiffness (m, m) of the near, of the far end and from far to near, of many equal elements."""
     start, end, across = (part[0] for part in form.element(length[None] / 2**DOUBLINGS))
 
-    def doubled(element: Three, _: None) -> tuple[Three, None]:
+    def doubled(element: Three, _: Array) -> tuple[Three, None]:
         start, end, across = element
         inverse = inverse_cholesky(end + start)
         before, after = inverse @ across.T, inverse @ across
         return (start - before.T @ before, end - after.T @ after, -before.T @ after), None
 
-    (start, end, across), _ = lax.scan(doubled, (start, end, across), length=DOUBLINGS)
+    (start, end, across), _ = scan(doubled, (start, end, across), np.arange(DOUBLINGS))
     return (start, end, across.T) if forwards else (end, start, across)
 
 

@@ -21,10 +21,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.contact_line.ends import Condition, End, beyond, compliance, end_section
 from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.section_form import SectionForm, W, without_lift
@@ -104,7 +104,7 @@ def leaving_end(
     """
     member, clamped = scene.member, scene.member.support == "clamped"
     half_height = member.beside(scene.strip).half_height
-    stretch = jnp.zeros_like(half_height)
+    stretch = 0.0 * half_height
     if not mounted:
         return Held(end_section(form), np.array([True, clamped])), stretch
     if member.overhang is not None:
@@ -132,5 +132,5 @@ def _lengths(length: Array, half_height: Array, count: int) -> Array:
     """Lengths (count,) of the elements beyond the contact, which grow from there on."""
     near = length * REACH * half_height / (length + REACH * half_height)
     grading = END_SIZE, None, GROWTH, 1.0, GROWTH
-    graded = elements.vertices(count - 1, near, half_height, *grading)
-    return jnp.append(jnp.diff(graded)[::-1], length - near)
+    graded, xp = elements.vertices(count - 1, near, half_height, *grading), numbers_of(near)
+    return xp.append(xp.diff(graded)[::-1], length - near)

@@ -11,20 +11,20 @@ import functools
 import os
 import warnings
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.jax_options import WALK
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.numerics.pushforward import Rule, pushforward
 
-TARGET = "jbeamshell_walk"
+TARGET, PATH = "jbeamshell_walk", "jbeamshell_path"
 LIBRARY = Path(__file__).with_name("libwalk.so")
 FORWARD, BACKWARD = "jbeamshell_slopes_forward", "jbeamshell_slopes_backward"
 REALS = 6  # of the levels' arrays, the first, have derivatives
@@ -52,9 +52,10 @@ def library() -> ctypes.CDLL | None:
     if os.environ.get(WALK) == "jax":
         return None
     try:
-        return ctypes.CDLL(str(LIBRARY))
+        found = ctypes.CDLL(str(LIBRARY))
     except OSError:
         return None
+    return found if hasattr(found, PATH) else None  # another version's may have none
 
 
 def in_words() -> str:
@@ -69,12 +70,15 @@ def in_words() -> str:
     return f"load paths are walked in JAX, more slowly ({reason})"
 
 
+def serves(*values: object) -> bool:
+    """True if the walk in C is there, and JAX takes it if any array of some pytrees is JAX's."""
+    return library() is not None and (numbers_of(*values) is np or is_taken())
+
+
 @functools.cache
-def serves() -> bool:
-    """True if the walk in C is there and JAX takes it."""
+def is_taken() -> bool:
+    """True if JAX takes the walk in C."""
     found = library()
-    if found is None:
-        return False
     jax.devices("cpu")  # a target that is refused before JAX has started ends it
     try:
         for target in (TARGET, FORWARD, BACKWARD):
@@ -91,31 +95,54 @@ def arguments(
     body: Body, friction: ArrayLike, start: ContactState, forces: ArrayLike, lift: ArrayLike
 ) -> Numbers:
     """Numbers of a path in the order of walk.c, without its flags."""
-    matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
-    pull = jnp.concatenate([body.f_t, body.f_n])
-    reactions = jnp.concatenate([start.r_t, start.r_n])
-    begin = jnp.stack([start.force, start.displacement])
+    xp = numbers_of(body, friction, start, forces, lift)
+    matrix = xp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
+    pull = xp.concatenate([body.f_t, body.f_n])
+    reactions = xp.concatenate([start.r_t, start.r_n])
+    begin = xp.stack([start.force, start.displacement])
     given = matrix, pull, body.x, friction, body.c, start.v, reactions, lift, begin, forces
-    return tuple(jnp.asarray(each, float) for each in given)
+    return tuple(xp.asarray(each, float) for each in given)
 
 
-@jax.custom_jvp
-def levels(given: Numbers, beside: Flags) -> Levels:
+def levels(given: Numbers, turns: ArrayLike | tuple[bool, ...], rounded: bool) -> Levels:
     """Levels of a path, see `walk.walk`; first derivatives are exact, forward and reverse.
 
     Parameters
     ----------
     given : `arguments`
-    beside : turns (levels,), and True to read the spline of the events
+    turns : (levels,) True where the load has turned
+    rounded : True to read the spline of the events
     """
+    xp = numbers_of(given, turns)
+    beside = xp.asarray(turns, bool), xp.asarray(rounded)
+    return _levels_at_once(given, beside) if xp is np else _levels(given, beside)
+
+
+def _levels_at_once(given: Numbers, beside: Flags) -> Levels:
+    """Levels of a path outside of JAX."""
+    found, inputs = library(), [np.ascontiguousarray(each) for each in (*given, *beside)]
+    assert found is not None
+    made: list[Any] = [np.empty(shape.shape, shape.dtype) for shape in _shapes(given)]
+    n, m, places, count = (given[place].size for place in (7, 1, 2, 9))
+    pointers = [
+        (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
+        for arrays in (inputs, made)
+    ]
+    if not getattr(found, PATH)(m - n, n, places, count, *pointers):
+        raise MemoryError("no memory for the walk of a load path")
+    return Levels(*made)
+
+
+@jax.custom_jvp
+def _levels(given: Numbers, beside: Flags) -> Levels:
     call = jax.ffi.ffi_call(TARGET, _shapes(given), vmap_method="expand_dims")
     return Levels(*call(*given, *beside))
 
 
-@levels.defjvp
+@_levels.defjvp
 def _levels_jvp(primals, tangents):  # type: ignore[no-untyped-def]
     given, beside = primals
-    found = levels(given, beside)
+    found = _levels(given, beside)
     slopes = pushforward(RULE, given, beside, tangents[0])
     none = (np.zeros(a.shape, jax.dtypes.float0) for a in (found.slipping, found.settled))
     return found, Levels(*slopes, *none)

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of, put
 from jbeamshell.contact_line.body import Elimination, Line, Unknown
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky
@@ -49,25 +49,28 @@ class Pair(NamedTuple):
         ----------
         top, bottom : sizes of the pressures on the upper and on the lower member
         """
-        sizes = jnp.append(top, bottom)
+        sizes = numbers_of(self, top).append(top, bottom)
         upper, lower = (as_one(moves, sizes) for moves in (self.upper, self.lower))
         below = self.elimination.pressed(bottom)
         return self._replace(elimination=below, upper=upper, lower=lower)
 
     def above(self, movement: Array) -> Array:
         """Movement of the member above and its loads, (steps, 2n + 2), from the pair's."""
-        return jnp.concatenate([movement @ self.upper.T, movement[:, -2:]], axis=1)
+        parts = movement @ self.upper.T, movement[:, -2:]
+        return numbers_of(self, movement).concatenate(parts, axis=1)
 
     def below(self, movement: Array) -> Array:
         """Movement of the member below in its own frame and its loads, (steps, 2n + 2)."""
         loads = movement[:, -2:] * np.array([0.0, 1.0])
-        return jnp.concatenate([movement @ self.lower.T, loads], axis=1)
+        parts = movement @ self.lower.T, loads
+        return numbers_of(self, movement).concatenate(parts, axis=1)
 
 
 def as_one(matrix: Array, sizes: Array) -> Array:
     """Matrix (rows, columns + 1) whose last columns (p) act as one, with some sizes (p,)."""
     others = matrix.shape[1] - sizes.size
-    return jnp.column_stack([matrix[:, :others], matrix[:, others:] @ sizes])
+    columns = matrix[:, :others], matrix[:, others:] @ sizes
+    return numbers_of(matrix, sizes).column_stack(columns)
 
 
 class Member(NamedTuple):
@@ -96,12 +99,12 @@ def joined(upper: Member, lower: Member) -> tuple[Pair, Array]:
     """
     size, dtype = upper.fixed.size, upper.line.hessian.dtype
     on_top, below = (member.line.hessian.shape[0] - size - 1 for member in (upper, lower))
-    total, both = size + 1 + on_top + below, []
+    xp, total, both = numbers_of(upper, lower), size + 1 + on_top + below, []
     # The pressures on the member below come after those on the one above.
     for member, own in ((upper, np.arange(on_top)), (lower, on_top + np.arange(below))):
         at = np.append(np.arange(size + 1), size + 1 + own)
-        both.append(jnp.zeros((total, total), dtype).at[np.ix_(at, at)].set(member.line.hessian))
-    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), size // 2), jnp.ones(total - size))
+        both.append(put(xp.zeros((total, total), dtype), np.ix_(at, at), member.line.hessian))
+    sign = xp.asarray(np.append(np.tile(UNITS, size // 2), np.ones(total - size)), dtype)
     below_seen = both[1] * sign[:, None] * sign
     hessian, q_1, q_2 = together(both[0], below_seen, upper.fixed, lower.fixed)
     moves = q_1[:size], (sign[:, None] * q_2)[:size]
@@ -119,8 +122,9 @@ def with_shanks(hessian: Array, stiffness: Array, down: Array) -> Array:
     stiffness : of all shanks together, force per width and length
     down : (n,) nodal forces of the pressure, in proportion to which it is spread
     """
-    spread = jnp.stack([stiffness * down / jnp.sum(down), jnp.zeros_like(down)], axis=1)
-    return hessian + jnp.diag(jnp.pad(spread.ravel(), (0, 2)))
+    xp = numbers_of(hessian, stiffness, down)
+    spread = xp.stack([stiffness * down / xp.sum(down), xp.zeros_like(down)], axis=1)
+    return hessian + xp.diag(xp.pad(spread.ravel(), (0, 2)))
 
 
 def together(
@@ -139,24 +143,24 @@ def together(
     q_1, q_2 : (k + m, k + m) displacements of each body and the loads from these
     """
     dtype, size = above.dtype, fixed_above.size
-    count = above.shape[0] - size
+    xp, count = numbers_of(above, below), above.shape[0] - size
     # Both from the movement z of the body below and g: q_1 = z + g, q_2 = z, unless one is held.
-    moves = jnp.asarray(~(fixed_above | fixed_below), dtype)
-    first = jnp.asarray(~fixed_above, dtype)
-    second = jnp.asarray(np.where(fixed_above & ~fixed_below, -1.0, 0.0), dtype)
+    moves = xp.asarray(~(fixed_above | fixed_below), dtype)
+    first = xp.asarray(~fixed_above, dtype)
+    second = xp.asarray(np.where(fixed_above & ~fixed_below, -1.0, 0.0), dtype)
 
     def in_both(scales: Array, matrix: Array) -> Array:
         return scales[:, None] * matrix * scales
 
-    on_z = in_both(moves, (above + below)[:size, :size]) + jnp.diag(1.0 - moves)
-    one, other = (jnp.append(part, jnp.ones(count)) for part in (first, second))
+    on_z = in_both(moves, (above + below)[:size, :size]) + xp.diag(1.0 - moves)
+    one, other = (xp.append(part, xp.ones(count, dtype)) for part in (first, second))
     mixed = moves[:, None] * (above[:size] * one + below[:size] * other)
     inverse = inverse_cholesky(on_z)
     reduced = inverse @ mixed
     hessian = in_both(one, above) + in_both(other, below) - reduced.T @ reduced
     z = -(inverse.T @ reduced) * moves[:, None]
-    unit = jnp.eye(size, size + count, dtype=dtype)
-    loads = jnp.eye(size + count, dtype=dtype)[size:]
-    q_1 = jnp.concatenate([z + first[:, None] * unit, loads])
-    q_2 = jnp.concatenate([z + second[:, None] * unit, loads])
+    unit = np.eye(size, size + count, dtype=dtype)
+    loads = np.eye(size + count, dtype=dtype)[size:]
+    q_1 = xp.concatenate([z + first[:, None] * unit, loads])
+    q_2 = xp.concatenate([z + second[:, None] * unit, loads])
     return hessian, q_1, q_2

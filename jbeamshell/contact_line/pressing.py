@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
-from jax import Array, lax
+from jax import Array
 
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.numbers_of import numbers_of, put, while_loop, without_slopes
 from jbeamshell.contact_line.tableau import exchanged, lines_of
 from jbeamshell.numerics.factors import solve
 
@@ -61,27 +61,28 @@ def press(
     gap : (n,) distance of the nodes before anything presses; None is none.  The lift is what is
         left of it
     """
-    solution = solve(k_tt, jnp.concatenate([k_tn, press_t[:, None]], axis=1))
+    xp = numbers_of(k_tt, k_tn, k_nn, press_t, press_n, gap)
+    solution = solve(k_tt, xp.concatenate([k_tn, press_t[:, None]], axis=1))
     stiffness = k_nn - k_tn.T @ solution[:, :-1]
     r_0 = press_n - k_tn.T @ solution[:, -1]
-    down, distance = jnp.sum(r_0), jnp.zeros_like(r_0) if gap is None else gap
+    down, distance = xp.sum(r_0), 0.0 * r_0 if gap is None else gap
     r_0 = r_0 - stiffness @ distance
-    opened, ends = jnp.arange(r_0.size) < r_0.size - 1, jnp.asarray(True)
+    opened, ends = xp.arange(r_0.size) < r_0.size - 1, xp.asarray(True)
     if foundation:
-        opened, ends = lax.stop_gradient(_open_nodes(stiffness, r_0, down))
+        opened, ends = _open_nodes(*without_slopes((stiffness, r_0, down)))
     block = opened[:, None] & opened
-    matrix = jnp.where(block, stiffness, jnp.diag(jnp.diag(stiffness)))
-    lift = jnp.where(opened, solve(matrix, jnp.where(opened, -r_0, 0.0)), 0.0)
+    matrix = xp.where(block, stiffness, xp.diag(xp.diag(stiffness)))
+    lift = xp.where(opened, solve(matrix, xp.where(opened, -r_0, 0.0)), 0.0)
     lift = nan_unless(ends, lift)
-    reaction = jnp.where(opened | (not foundation), 0.0, r_0 + stiffness @ lift)
+    reaction = xp.where(opened | (not foundation), 0.0, r_0 + stiffness @ lift)
     return Pressing(lift, -solution[:, -1] - solution[:, :-1] @ (lift - distance), reaction)
 
 
 def _open_nodes(stiffness: Array, r_0: Array, down: Array) -> tuple[Array, Array]:
     """Open nodes (n,), and True if the events came to an end; ``down`` is the whole pressure."""
-    n = r_0.size
-    even = jnp.maximum(down, 0.0) / n * jnp.ones(n)
-    rows = jnp.concatenate([stiffness, even[:, None], (r_0 - even)[:, None]], axis=1)
+    xp, n = numbers_of(stiffness, r_0), r_0.size
+    even = xp.maximum(down, 0.0) / n * xp.ones(n)
+    rows = xp.concatenate([stiffness, even[:, None], (r_0 - even)[:, None]], axis=1)
 
     class Walk(NamedTuple):
         rows: Array
@@ -91,9 +92,9 @@ def _open_nodes(stiffness: Array, r_0: Array, down: Array) -> tuple[Array, Array
 
     def next_event(now: Walk) -> tuple[Array, Array]:
         value, rate = now.rows[:, -2] + now.rows[:, -1] * now.at, now.rows[:, -1]
-        wait = jnp.maximum(value, 0.0) / jnp.where(rate < 0.0, -rate, 1.0)
-        wait = jnp.where(rate < 0.0, wait, jnp.inf)
-        node = jnp.argmin(wait)
+        wait = xp.maximum(value, 0.0) / xp.where(rate < 0.0, -rate, 1.0)
+        wait = xp.where(rate < 0.0, wait, xp.inf)
+        node = xp.argmin(wait)
         return now.at + wait[node], node
 
     def unfinished(now: Walk) -> Array:
@@ -102,8 +103,8 @@ def _open_nodes(stiffness: Array, r_0: Array, down: Array) -> tuple[Array, Array
     def go(now: Walk) -> Walk:
         at, node = next_event(now)
         rows = exchanged(lines_of(now.rows, node), node)
-        return Walk(rows, now.opened.at[node].set(~now.opened[node]), at, now.events + 1)
+        return Walk(rows, put(now.opened, node, ~now.opened[node]), at, now.events + 1)
 
-    start = Walk(rows, jnp.zeros(n, bool), jnp.zeros(()), jnp.asarray(0))
-    end = lax.while_loop(unfinished, go, start)
+    start = Walk(rows, xp.zeros(n, bool), xp.zeros(()), xp.asarray(0))
+    end = while_loop(unfinished, go, start)
     return end.opened, (next_event(end)[0] >= 1.0) & (down > 0.0)

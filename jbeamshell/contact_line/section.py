@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.mechanics.homogeneous import plane_modulus, plane_stiffness, shear_modulus
 from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS, Section, linear_strains
 from jbeamshell.mechanics.layered import Material, layered_form
@@ -28,15 +29,15 @@ def section_form(scene: Scene) -> SectionForm:
 def thicknesses(scene: Scene) -> Array:
     """Thickness of each layer from the bottom up; that of a homogeneous strip is its height."""
     layers, height = scene.strip.layers, 2.0 * scene.strip.half_height
-    return jnp.reshape(height, 1) if layers is None else layers[:, 0]
+    return numbers_of(height).reshape(height, 1) if layers is None else layers[:, 0]
 
 
 def _plane(scene: Scene) -> SectionForm:
     """Section of plane elasticity, homogeneous or layered."""
     strip = scene.strip
     if strip.layers is None:
-        modulus = jnp.reshape(strip.plane_modulus, 1)
-        nu = jnp.reshape(jnp.asarray(strip.poisson_ratio), 1)
+        given = strip.plane_modulus, strip.poisson_ratio
+        modulus, nu = (numbers_of(given).reshape(number, 1) for number in given)
     else:
         _, youngs, nu = strip.layers.T
         modulus = plane_modulus(youngs, nu, strip.plane)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.numbers_of import numbers_of, put
 from jbeamshell.common.precision import doubled, is_single, rounded
 from jbeamshell.common.small import Small
+from jbeamshell.contact_line import native
 from jbeamshell.contact_line.above import Movement, Unread
 from jbeamshell.contact_line.bearings import bearing_energy, with_bearings, with_gaps
 from jbeamshell.contact_line.contact_state import ContactState, pressed
@@ -134,15 +136,28 @@ def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
     return turns_of(targets) if is_traced(targets) else known_turns(np.asarray(targets))
 
 
-@functools.partial(Small, level=0)
 def _unpressed(scene: Scene) -> Unpressed:
+    """Strip of a scene on its contact line, condensed for pressures of any size."""
+    strip = _condensed(scene)
+    # What follows compiles nothing for arrays of NumPy.
+    return strip if is_traced(strip) or is_staged() else jax.device_get(strip)
+
+
+@functools.partial(Small, level=0, by_numpy=lambda scene: scene.plan.elastic)
+def _condensed(scene: Scene) -> Unpressed:
     """Strip of a scene on its contact line, condensed for pressures of any size."""
     strip = unpressed(scene, scene.plan.nodes)
     no_masses = strip.form.masses[:0]  # of no use without inertia, and slow to compile
     return strip._replace(form=strip.form._replace(masses=no_masses))
 
 
-@Small
+def _is_quick(inputs: tuple[Any, ...]) -> bool:
+    """True if NumPy presses and walks a strip: what walks in JAX has to be compiled."""
+    _, _, *path = inputs
+    return native.library() is not None and (not path or path[1] is None)
+
+
+@functools.partial(Small, by_numpy=_is_quick)
 def _pressed(inputs: tuple[Scene, Unpressed]) -> Strip:
     """Strip of a scene, pressed down."""
     return pressed_strip(*inputs)
@@ -161,7 +176,7 @@ def _strip_of(scene: Scene) -> Strip:
 strip_of = kept(_strip_of, alike)
 
 
-@Small
+@functools.partial(Small, by_numpy=_is_quick)
 def _walk(
     inputs: tuple[Scene, Strip, Array, Array | None, Turns],
     known_turns: tuple[bool, ...],
@@ -186,36 +201,42 @@ def _walk(
 
 def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, turns: Turns) -> Level:
     """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
-    body, friction, member = strip.body, scene.contact.friction, scene.member
+    xp, body, friction, member = (
+        numbers_of(scene, strip, targets),
+        strip.body,
+        scene.contact.friction,
+        scene.member,
+    )
     lift, bearing = strip.lift, member.bearing_stiffness
     if bearing is not None:
-        share = (strip.load / jnp.sum(strip.load))[::-1]
+        share = (strip.load / xp.sum(strip.load))[::-1]
         body = with_bearings(body, bearing, share)
         lift = with_gaps(lift, 0.0 if member.clearance is None else member.clearance)
     soft = scene.contact.stick_stiffness is not None
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
-    press = Press.of(strip.loaded.hessian, body.f_t.size, body.f_n.size - strip.x.size)
-    if scene.load.control == "displacement":
+    by_displacement = scene.load.control == "displacement"
+    if by_displacement:
         body = driven_by_displacement(body)
-        press = press.driven_by_displacement(body)
     start = pressed(body)
     # The pressures squeeze an even strip flat.
     flat = None if stays_flat(scene) else lift
     if not targets.size:
         none = Level(start, lift, start.force, start.v > 0.0, start.force >= 0.0)
-        levels = jax.tree.map(lambda a: jnp.zeros((0, *a.shape), a.dtype), none)
+        levels = jax.tree.map(lambda a: xp.zeros((0, *xp.shape(a)), a.dtype), none)
     elif parts is not None:
+        press = Press.of(strip.loaded.hessian, body.f_t.size, body.f_n.size - strip.x.size)
+        press = press.driven_by_displacement(body) if by_displacement else press
         levels = walk_with_pressures(body, press, friction, start, targets, parts, flat)
     else:
         levels = walk(body, friction, start, targets, turns, flat)
-    sound = jnp.all(jnp.isfinite(strip.lift))
+    sound = xp.all(xp.isfinite(strip.lift))
     state = levels.state
-    if scene.load.control == "displacement":
-        state = jax.vmap(exchanged)(state)
+    if by_displacement:
+        state = exchanged(state)
     if soft:
         rise = levels.lift - lift
-        state = state._replace(v=jax.vmap(springs.slip)(state.v, rise, state.force))
+        state = state._replace(v=springs.slip(state.v, rise, state.force))
     return levels._replace(state=state, settled=levels.settled & sound)
 
 
@@ -228,20 +249,20 @@ def _history(
     ----------
     parts : parts (levels,) of the pressures that act; None is all of them
     """
-    before, state = scene.load.pressure_steps, levels.state
+    xp, before, state = numbers_of(scene, strip, levels), scene.load.pressure_steps, levels.state
     steps = before + state.force.size
-    part = jnp.asarray(np.minimum(np.arange(1, steps + 1) / before, 1.0), state.force.dtype)
-    pressure = part if parts is None else jnp.append(part[:before], parts)
-    sound = jnp.append(jnp.ones(before, bool), levels.settled)
+    part = xp.asarray(np.minimum(np.arange(1, steps + 1) / before, 1.0), state.force.dtype)
+    pressure = part if parts is None else xp.append(part[:before], parts)
+    sound = xp.append(xp.ones(before, bool), levels.settled)
     movement = _movement(strip, levels, part, pressure, sound)
     energy, sinking = _energy(scene, strip, movement, state)
     traction, reaction = _on_base(strip, state, part[:before])
     moved = part[:, None] * movement.at_rest + movement.change
     driven = state.displacement if scene.load.control == "displacement" else state.force
-    status = jnp.where(sound, Status.CONVERGED, Status.MAX_ITERATIONS)
+    status = xp.where(sound, Status.CONVERGED, Status.MAX_ITERATIONS)
 
     def every(values: Array) -> Array:
-        return jnp.pad(values, (before, 0))
+        return xp.pad(values, (before, 0))
 
     def masked(values: Array) -> Array:
         return nan_unless(sound, values)
@@ -264,8 +285,8 @@ def _history(
         stored_energy=masked(energy),
         pressure=pressure,
         sinking=masked(sinking),
-        iterations=jnp.zeros(part.size, int),
-        error=jnp.zeros(part.size),
+        iterations=xp.zeros(part.size, int),
+        error=xp.zeros(part.size),
         status=status,
         cycles=cycles,
         target=masked(every(driven)),
@@ -275,7 +296,8 @@ def _history(
 
 def _along(values: Array, nodes: int, before: int) -> Array:
     """Values (levels, k) as (before + levels, nodes) from the far end, zero before the levels."""
-    return jnp.pad(values[:, ::-1], ((before, 0), (nodes - values.shape[1], 0)))
+    empty = (before, 0), (nodes - values.shape[1], 0)
+    return numbers_of(values).pad(values[:, ::-1], empty)
 
 
 def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: Array) -> Movement:
@@ -287,15 +309,15 @@ def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: 
     pressure : (steps,) part of the pressures that acts
     sound : (steps,) False from the first step on that has no equilibrium
     """
-    n, before = strip.x.size, part.size - levels.settled.size
+    xp, n, before = numbers_of(strip, levels, part), strip.x.size, part.size - levels.settled.size
     settled = _along(strip.settled[None], n, 0)[0]
-    at_rest = jnp.append(jnp.stack([settled, strip.lift[::-1]], axis=1), jnp.array([0.0, 1.0]))
+    at_rest = xp.append(xp.stack([settled, strip.lift[::-1]], axis=1), xp.array([0.0, 1.0]))
     slip, rise = (
         _along(values, n, before) for values in (levels.state.v, levels.lift[:, :n] - strip.lift)
     )
-    change = jnp.stack([slip, rise], axis=2).reshape(part.size, 2 * n)
-    force = jnp.pad(levels.state.force, (before, 0))
-    change = jnp.column_stack([change, force, pressure - part])
+    change = xp.stack([slip, rise], axis=2).reshape(part.size, 2 * n)
+    force = xp.pad(levels.state.force, (before, 0))
+    change = xp.column_stack([change, force, pressure - part])
     return Movement(at_rest, change, part, sound)
 
 
@@ -304,17 +326,18 @@ def _energy(
 ) -> tuple[Array, Array]:
     """Stored energy (steps,) with the potential of the pressures, and their sinking."""
     at_rest, change, part, _ = movement
-    n, before = strip.x.size, part.size - state.force.size
+    xp, n, before = numbers_of(strip, movement), strip.x.size, part.size - state.force.size
     # Conjugate to v and w, minus the end load, and the pressure.
     resting, added = at_rest @ strip.pressed.hessian, change @ strip.loaded.hessian
-    energy = 0.5 * part**2 * (resting @ at_rest) + change @ resting.at[-2].set(0.0)
-    energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * change[:, -2]
+    energy = 0.5 * part**2 * (resting @ at_rest) + change @ put(resting, -2, 0.0)
+    energy = energy + 0.5 * xp.sum(added * change, axis=1) - added[:, -2] * change[:, -2]
     bearing = scene.member.bearing_stiffness
     if scene.contact.stick_stiffness is not None:
         springs = spring_energy(spring_stiffness(scene, strip), state.r_t)
-        energy = energy.at[before:].add(springs)
+        energy = xp.append(energy[:before], energy[before:] + springs)
     if bearing is not None:
-        energy = energy.at[before:].add(bearing_energy(bearing, state.r_n[:, n:]))
+        bearings = bearing_energy(bearing, state.r_n[:, n:])
+        energy = xp.append(energy[:before], energy[before:] + bearings)
     return energy, part * resting[-1] + added[:, -1]
 
 
@@ -325,7 +348,7 @@ def _on_base(strip: Strip, state: ContactState, pressing: Array) -> tuple[Array,
     ----------
     pressing : (before,) part of the pressures while they press the strip down
     """
-    n, share = strip.x.size, pressing[:, None]
-    r_t = jnp.concatenate([share * strip.body.t_0, state.r_t])
-    r_n = jnp.concatenate([share * strip.body.r_0, state.r_n[:, :n]])
+    xp, n, share = numbers_of(strip, state), strip.x.size, pressing[:, None]
+    r_t = xp.concatenate([share * strip.body.t_0, state.r_t])
+    r_n = xp.concatenate([share * strip.body.r_0, state.r_n[:, :n]])
     return -_along(r_t, n, 0) / strip.tributary, r_n[:, ::-1] / strip.tributary

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
 
@@ -29,26 +29,25 @@ def stations(scene: Scene, nodes: int) -> Array:
         return elements.vertices(nodes - 1, length, half_height, *grading)
     if steps is None:
         return _plane_vertices(scene, nodes, PLANE_END_SIZE, None, PLANE_GROWTH)
-    inside = jnp.append(steps < length, False)
-    sizes = jnp.where(inside, STEP_SIZE, PLANE_END_SIZE)
-    growths = jnp.where(inside, elements.GROWTH, PLANE_GROWTH)
+    xp = numbers_of(steps)
+    inside = xp.append(steps < length, False)
+    sizes = xp.where(inside, STEP_SIZE, PLANE_END_SIZE)
+    growths = xp.where(inside, elements.GROWTH, PLANE_GROWTH)
     return _plane_vertices(scene, nodes, sizes, steps, growths)
 
 
 def _joint_stations(scene: Scene, nodes: int) -> Array:
     """Stations of a lap joint, denser at its ends and at steps of the pressure."""
     length, half_height = scene.strip.length, scene.strip.half_height
-    steps, plan = scene.contact.steps(length), scene.plan
+    steps, plan, xp = scene.contact.steps(length), scene.plan, numbers_of(length)
+    none = xp.zeros(0, length.dtype) if steps is None else steps
+    foci = xp.append(0.0 * length, none)
     if not plan.elastic:
-        start = jnp.zeros_like(length)[None]
-        foci = start if steps is None else jnp.append(start, steps)
         grading = (plan.end_size, foci, elements.GROWTH, plan.far_size, plan.small_growth)
         return elements.vertices(nodes - 1, length, half_height, *grading)
-    none = jnp.zeros((0,), length.dtype) if steps is None else steps
-    foci = jnp.append(jnp.zeros_like(length), none)
-    ends = jnp.concatenate([jnp.array([True]), ~(none < length), jnp.array([True])])
-    sizes = jnp.where(ends, PLANE_END_SIZE, STEP_SIZE)
-    growths = jnp.where(ends, PLANE_GROWTH, elements.GROWTH)
+    ends = xp.append(xp.append(True, ~(none < length)), True)
+    sizes = xp.where(ends, PLANE_END_SIZE, STEP_SIZE)
+    growths = xp.where(ends, PLANE_GROWTH, elements.GROWTH)
     return _plane_vertices(scene, nodes, sizes, foci, growths)
 
 

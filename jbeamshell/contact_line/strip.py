@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of, put
 from jbeamshell.contact_line import entry
 from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body, Elimination, Unknown, eliminate
@@ -49,11 +50,11 @@ class Members(NamedTuple):
         top, bottom : sizes of the pressures on both faces, or members
         up : (n,) nodal forces of the latter, on the contact line of a strip alone
         """
-        elimination, pair = self.elimination.pressed(top), self.pair
-        sizes = top if pair is None else jnp.append(top, bottom)
+        xp, elimination, pair = numbers_of(self, top), self.elimination.pressed(top), self.pair
+        sizes = top if pair is None else xp.append(top, bottom)
         hessian = as_one(as_one(self.hessian, sizes).T, sizes)
         if pair is None:
-            lift = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+            lift = xp.pad(xp.stack([xp.zeros_like(up), up], axis=1).ravel(), (0, 2))
             from_below = lift[:, None] * np.eye(lift.size)[-1]
             return Members(elimination, hessian - from_below - from_below.T)
         return Members(elimination, hessian, pair.pressed(top, bottom))
@@ -153,7 +154,7 @@ def unpressed(scene: Scene, nodes: int) -> Unpressed:
 
 def pressed(scene: Scene, strip: Unpressed) -> Strip:
     """Strip under a scene's pressures, condensed for its other numbers."""
-    form, x = strip.form, strip.x
+    form, x, xp = strip.form, strip.x, numbers_of(scene, strip)
     top, bottom = _sizes(scene)
     down, up = strip.top @ top, strip.bottom @ bottom
     tributary = elements.tributary_lengths(RULE, x)
@@ -168,21 +169,21 @@ def pressed(scene: Scene, strip: Unpressed) -> Strip:
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
     # Without friction the far end keeps its place, even if nothing else holds it.
     count = x.size - 1
-    press_t, traction = press[v][:count], jnp.zeros_like(press[v])
+    press_t, traction = press[v][:count], xp.zeros_like(press[v])
     stiffness = k_tt[:count, :count], k_tn[:count], hessian[w, w]
     gaps = None if gap is None else gap[::-1]
     if scene.member.assembly == "frictional":
         loads = press[v], press[w], scene.contact.friction
         lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads, gaps)
     elif stays_flat(scene):
-        lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
+        lift, reaction = 0.0 * x, (down - up)[::-1]
         settled = solve(stiffness[0], -press_t)
     else:
         based = scene.contact.normal == "rigid"
         lift, settled, reaction = press_down(*stiffness, press_t, press[w], based, gaps)
     if gap is not None:
         under_pressure, under_load = (over_gap(part, gap) for part in (under_pressure, under_load))
-    settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
+    settled = xp.pad(settled, (0, k_tt.shape[0] - settled.size))
     hessian = under_load.hessian
     if scene.member.bolt_stiffness is not None:
         hessian = with_shanks(hessian, scene.member.bolt_stiffness, down)
@@ -220,7 +221,8 @@ def _joint(
     members, load = [], 2 * x.size
     for upper, lower, stretch in lap_members(scene, form, x, top, bottom):
         pair, hessian = joined(upper, lower)
-        members.append(Members(upper.line.elimination, hessian.at[load, load].add(stretch), pair))
+        hessian = put(hessian, (load, load), hessian[load, load] + stretch)
+        members.append(Members(upper.line.elimination, hessian, pair))
     return members[0], members[-1]
 
 
@@ -245,7 +247,7 @@ def lap_members(
     arm = strip.half_height + scene.member.beside(strip).half_height
     arm = arm if scene.load.arm is None else arm + scene.load.arm
     pull = below.turn if scene.load.kind == "moment" else below.pull + arm * below.turn
-    below = below._replace(pull=jnp.zeros_like(below.pull))  # the load acts above
+    below = below._replace(pull=0.0 * below.pull)  # the load acts above
     free = np.zeros((n - 1, 2), bool)
     states = entry.states(scene)
     entering = [entry.loaded_end(scene, upper_form, mounted) for mounted in states]
@@ -270,8 +272,10 @@ def over_gap(members: Members, gap: Array) -> Members:
     ----------
     gap : (n,) distance g_0 of the members before anything presses
     """
-    shift = jnp.stack([jnp.zeros_like(gap), -gap], axis=1).ravel()
-    change = jnp.eye(shift.size + 2, dtype=gap.dtype).at[:-2, -1].add(shift)
+    xp = numbers_of(members, gap)
+    shift = xp.stack([0.0 * gap, -gap], axis=1).ravel()
+    unit = np.eye(shift.size + 2, dtype=gap.dtype)
+    change = put(unit, (slice(-2), -1), shift)
     pair = members.pair
     assert pair is not None
     moved = pair._replace(upper=pair.upper @ change, lower=pair.lower @ change)
@@ -283,7 +287,8 @@ def initial_gap(scene: Scene, x: Array) -> Array | None:
     gap = scene.member.gap
     if gap is None:
         return None
-    return jnp.interp(x, gap[:, 0], gap[:, 1]) if gap.ndim else jnp.broadcast_to(gap, x.shape)
+    xp = numbers_of(gap, x)
+    return xp.interp(x, gap[:, 0], gap[:, 1]) if gap.ndim else xp.broadcast_to(gap, x.shape)
 
 
 def loaded(form: SectionForm, load: Load) -> SectionForm:
@@ -303,10 +308,10 @@ def _sizes(scene: Scene) -> tuple[Array, Array]:
 def _rows(x: Array, pressure: Array) -> Array:
     """Nodal forces (n, p) of the rows of a pressure, each of size 1."""
     if pressure.ndim == 0:
-        return elements.nodal_loads(RULE, x, jnp.ones((), x.dtype))[:, None]
-    places, units = pressure[:, 0], np.eye(len(pressure))
-    tables = [jnp.stack([places, jnp.asarray(unit, x.dtype)], axis=1) for unit in units]
-    return jnp.stack([elements.nodal_loads(RULE, x, table) for table in tables], axis=1)
+        return elements.tributary_lengths(RULE, x)[:, None]
+    xp, places, units = numbers_of(x, pressure), pressure[:, 0], np.eye(len(pressure))
+    tables = [xp.stack([places, xp.asarray(unit, x.dtype)], axis=1) for unit in units]
+    return xp.stack([elements.nodal_loads(RULE, x, table) for table in tables], axis=1)
 
 
 def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:
@@ -375,6 +380,7 @@ def moved_by(members: Members, movement: Array) -> tuple[Array, Array | None]:
 
 def _fields(elimination: Elimination | Unknown, movement: Array) -> Array:
     """Fields (m, n, steps) of a form from v and w of its stations, load and pressure (steps, :)."""
+    xp = numbers_of(elimination, movement)
     contact = movement[:, :-2].reshape(len(movement), -1, 2)
     inner = elimination.recovered(movement.T)  # (n, m-2, steps)
-    return jnp.concatenate([contact.T, jnp.moveaxis(inner, 1, 0)])
+    return xp.concatenate([contact.T, xp.moveaxis(inner, 1, 0)])

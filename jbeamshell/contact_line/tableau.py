@@ -18,7 +18,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array, lax
+
+from jbeamshell.common.numbers_of import numbers_of, put
 
 KINDS = 5  # of events
 ALONG, AGAINST, STICK, OPEN, CLOSE = range(KINDS)
@@ -181,19 +184,22 @@ def lines_of(
 ) -> Lines:
     """Lines to exchange row and column ``i``, to whose row ``added`` times the row ``other`` goes.
 
-    They are read in a loop that runs once.  Otherwise the compiler reads them from the matrix
-    whenever it needs them, and copies the whole matrix before it is overwritten.
+    In JAX they are read in a loop that runs once.  Otherwise the compiler reads them from the
+    matrix whenever it needs them, and copies the whole matrix before it is overwritten.
     """
     other = i if other is None else other
 
-    def read(now: tuple[Lines, Array]) -> tuple[Lines, Array]:
-        whole = now[0].matrix
-        beside = whole[other]
-        row = whole[i] + added * beside
-        return Lines(whole, row, beside, whole[:, i]), jnp.asarray(False)
+    def lines(whole: Array) -> Lines:
+        return Lines(whole, whole[i] + added * whole[other], whole[other], whole[:, i])
 
+    if numbers_of(matrix) is np:
+        return lines(matrix)
     none = jnp.zeros(matrix.shape[1], matrix.dtype)
     unread = Lines(matrix, none, none, jnp.zeros(matrix.shape[0], matrix.dtype))
+
+    def read(now: tuple[Lines, Array]) -> tuple[Lines, Array]:
+        return lines(now[0].matrix), jnp.asarray(False)
+
     return lax.while_loop(lambda now: now[1], read, (unread, jnp.asarray(True)))[0]
 
 
@@ -205,7 +211,7 @@ def exchanged(
     matrix, row, beside, column = lines
     pivot = row[i]
     share = column / pivot
-    beside = (beside - share[other] * row).at[i].set(share[other])
-    new = (-row / pivot).at[i].set(1.0 / pivot) + rest * beside
+    beside = put(beside - share[other] * row, i, share[other])
+    new = put(-row / pivot, i, 1.0 / pivot) + rest * beside
     swept = matrix - share[:, None] * row
-    return swept.at[:, i].set(share).at[i].set(new)
+    return put(put(swept, (slice(None), i), share), i, new)

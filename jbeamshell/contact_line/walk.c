@@ -773,6 +773,15 @@ void run(Desk *desk, const Given *given, int same_body, int levels, Levels out) 
     path(w, from, from + 1, given->f, levels, given->loads, given->turn, *given->rounded, out, desk->change, desk->flags);
 }
 
+/* Levels of one path, for callers without XLA; 0 without memory. */
+API int jbeamshell_path(int k, int n, int places, int levels, const Given *given, const Levels *out) {
+    Desk desk;
+    if (!open_desk(&desk, k, n, places)) return 0;
+    run(&desk, given, 0, levels, *out);
+    close_desk(&desk);
+    return 1;
+}
+
 /* --- handler for XLA ---------------------------------------------------------------------------- */
 
 /* Path of a lane, and the numbers of its arrays in their buffers. */

@@ -166,10 +166,10 @@ def walk(
     Level
         with the axis of the levels first
     """
-    lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    if forces.dtype == float and native.serves():
+    lift = 0.0 * start.r_n if lift is None else lift
+    if forces.dtype == float and native.serves(body, friction, start, forces, lift):
         given = native.arguments(body, friction, start, forces, lift)
-        found = native.levels(given, (jnp.asarray(turns), jnp.asarray(rounded)))
+        found = native.levels(given, turns, rounded)
         state = ContactState(found.v, found.r_t, found.r_n, forces, found.displacement)
         return Level(state, found.lift, found.slip_work, found.slipping, found.settled)
     return walk_on(body, friction, Contact.of(start, lift), forces, turns, rounded)[0]

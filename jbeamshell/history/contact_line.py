@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
+import functools
+
+import numpy as np
 from jax import Array
 
 from jbeamshell.common.numbers_of import numbers_of
+from jbeamshell.common.small import Small, always
 from jbeamshell.history.record import Record
 
 
@@ -31,7 +33,8 @@ class ContactLine(Record):
         is continued linearly from the nodes before; the contact reaches as far as the nodal force
         of that last node needs.
         """
-        return _contact_ends(self.x, self.tributary, self.touching, self.reaction)
+        ends: Array = _contact_ends((self.x, self.tributary, self.touching, self.reaction))
+        return ends
 
     @property
     def reaction_max(self) -> Array:
@@ -52,23 +55,20 @@ class ContactLine(Record):
         return numbers_of(self.reaction).min(self.reaction)
 
 
-@jax.jit
-def _contact_ends(x: Array, tributary: Array, touching: Array, reaction: Array) -> Array:
+@functools.partial(Small, by_numpy=always)
+def _contact_ends(inputs: tuple[Array, Array, Array, Array]) -> Array:
     """Positions X at which the contact ends; see `ContactLine.contact_end`."""
-    last = x.size - 1
-    share_begins = jnp.cumsum(tributary) - tributary
-
-    def end(touching: Array, reaction: Array) -> Array:
-        j = last - jnp.argmax(touching[::-1])
-        before = jnp.maximum(j - 1, 1)
-        slope = (reaction[before] - reaction[before - 1]) / (x[before] - x[before - 1])
-        force, begin = reaction[j] * tributary[j], share_begins[j]
-        width = tributary[j]
-        for _ in range(3):
-            level = reaction[before] + slope * (begin + 0.5 * width - x[before])
-            width = jnp.where(level > 0.0, force / jnp.where(level > 0.0, level, 1.0), width)
-            width = jnp.clip(width, 0.0, tributary[j])  # beyond it, the next node would touch
-        found = jnp.where(j == last, x[last], begin + width)
-        return jnp.where(jnp.any(touching), found, 0.0)
-
-    return jax.vmap(end)(touching, reaction)
+    x, tributary, touching, reaction = inputs
+    xp, last, step = numbers_of(inputs), x.size - 1, np.arange(len(touching))
+    j = last - xp.argmax(touching[:, ::-1], axis=1)
+    before = xp.maximum(j - 1, 1)
+    near = reaction[step, before]
+    slope = (near - reaction[step, before - 1]) / (x[before] - x[before - 1])
+    force, whole = reaction[step, j] * tributary[j], tributary[j]
+    begin, width = (xp.cumsum(tributary) - tributary)[j], whole
+    for _ in range(3):
+        level = near + slope * (begin + 0.5 * width - x[before])
+        width = xp.where(level > 0.0, force / xp.where(level > 0.0, level, 1.0), width)
+        width = xp.clip(width, 0.0, whole)  # beyond it, the next node would touch
+    found = xp.where(j == last, x[last], begin + width)
+    return xp.where(xp.any(touching, axis=1), found, 0.0)

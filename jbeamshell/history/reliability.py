@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Protocol, Self
 
-import jax
 import numpy as np
 from jax import Array
 
@@ -70,7 +69,7 @@ def change_of(coarse: Run, fine: Run) -> Array:
     """
     one, other = (np.array([run.dissipation, run.secant_stiffness]) for run in (coarse, fine))
     with np.errstate(divide="ignore", invalid="ignore"):  # nothing slips on either
-        return jax.numpy.max(np.nan_to_num(np.abs(one / other - 1.0), nan=np.inf))
+        return np.max(np.nan_to_num(np.abs(one / other - 1.0), nan=np.inf))
 
 
 def ratio_of_losses(one: Run, other: Run) -> Array:

@@ -25,8 +25,10 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 from jax.typing import ArrayLike
+
+from jbeamshell.common.numbers_of import numbers_of, put, without_slopes
 
 ORDER = {"finite-difference": 1, "collocation": 2}
 
@@ -124,55 +126,57 @@ def vertices(
     --------
     >>> vertices(4, length=2.0, half_height=0.1)
     """
-    length = jnp.asarray(length)
-    foci = length[None] if steps is None else jnp.append(steps, length)
-    far = far_size * length
-    end = jnp.asarray(end_size) * jnp.asarray(half_height)
-    small = jnp.maximum(end, jnp.minimum(SMALL * jnp.asarray(half_height), far))
-    rate = jnp.where(far >= end, jnp.asarray(growth), -jnp.asarray(growth))
+    xp = numbers_of(length, half_height, end_size, steps, growth)
+    whole, high = xp.asarray(length), xp.asarray(half_height)
+    foci = whole[None] if steps is None else xp.append(steps, whole)
+    far = far_size * whole
+    end = xp.asarray(end_size) * high
+    small = xp.maximum(end, xp.minimum(SMALL * high, far))
+    rate = xp.where(far >= end, xp.asarray(growth), -xp.asarray(growth))
     # At the distance d from a focus the size h(d) grows along a straight line from end to small, a
     # flatter one to far, and stays so.  The number of elements within d, int dd/h(d), is a
     # logarithm along each of the two, and then a straight line.
     first, second = (small - end) / small_growth, (far - small) / rate
-    first_count = jnp.log1p(small_growth * first / end) / small_growth
-    second_count = jnp.log1p(rate * second / small) / rate
+    first_count = xp.log1p(small_growth * first / end) / small_growth
+    second_count = xp.log1p(rate * second / small) / rate
 
     def at(values: Array, i: ArrayLike) -> Array:
         # Where all foci are alike nothing is gathered: programs then agree on x to the last bit.
         return values[i] if values.ndim else values
 
     def count(distance: Array, i: ArrayLike) -> Array:
-        slope, near = at(rate, i), jnp.minimum(distance, at(first, i))
-        middle = jnp.minimum(distance - near, at(second, i))
-        elements = jnp.log1p(small_growth * near / at(end, i)) / small_growth
-        elements = elements + jnp.log1p(slope * middle / at(small, i)) / slope
+        slope, near = at(rate, i), xp.minimum(distance, at(first, i))
+        middle = xp.minimum(distance - near, at(second, i))
+        elements = xp.log1p(small_growth * near / at(end, i)) / small_growth
+        elements = elements + xp.log1p(slope * middle / at(small, i)) / slope
         return elements + (distance - near - middle) / far
 
     def reach(elements: Array, i: ArrayLike) -> Array:
-        slope, near = at(rate, i), jnp.minimum(elements, at(first_count, i))
-        middle = jnp.minimum(elements - near, at(second_count, i))
-        distance = at(end, i) * jnp.expm1(small_growth * near) / small_growth
-        distance = distance + at(small, i) * jnp.expm1(slope * middle) / slope
+        slope, near = at(rate, i), xp.minimum(elements, at(first_count, i))
+        middle = xp.minimum(elements - near, at(second_count, i))
+        distance = at(end, i) * xp.expm1(small_growth * near) / small_growth
+        distance = distance + at(small, i) * xp.expm1(slope * middle) / slope
         return distance + far * (elements - near - middle)
 
     # Pieces run alternately towards a focus and away from one: from 0 to the first focus, from
     # there half way to the next focus, and so on.
     half_way = 0.5 * (foci[:-1] + foci[1:])
-    edges = jnp.append(0.0, jnp.append(jnp.stack([foci[:-1], half_way], 1).ravel(), length))
+    edges = xp.append(0.0, xp.append(xp.stack([foci[:-1], half_way], 1).ravel(), whole))
     pieces = np.arange(edges.size - 1)
-    counts = jnp.append(0.0, jnp.cumsum(count(jnp.diff(edges), pieces // 2)))
-    target = counts[-1] * jnp.arange(elements + 1) / elements
+    counts = xp.append(0.0, xp.cumsum(count(xp.diff(edges), pieces // 2)))
+    target = counts[-1] * xp.arange(elements + 1) / elements
     # The search is a loop, which nothing is fused with: programs then agree on x to the last bit.
-    piece = jnp.clip(jnp.searchsorted(counts, target, side="right") - 1, 0, edges.size - 2)
+    piece = xp.clip(xp.searchsorted(counts, target, side="right") - 1, 0, edges.size - 2)
     away = edges[piece] + reach(target - counts[piece], piece // 2)
     towards = edges[piece + 1] - reach(counts[piece + 1] - target, piece // 2)
-    x = jnp.where(piece % 2 == 1, away, towards)
-    return x.at[0].set(0.0).at[-1].set(length)
+    inner = xp.where(piece % 2 == 1, away, towards)[1:-1]
+    return xp.concatenate([0.0 * whole[None], inner, whole[None]])
 
 
 def table_steps(table: Array, length: ArrayLike) -> Array:
     """Positions X at which a table of (X, value) jumps, (rows - 1,); L where it does not."""
-    return jnp.sort(jnp.where(jnp.diff(table[:, 0]) > 0.0, length, table[1:, 0]))
+    xp = numbers_of(table, length)
+    return xp.sort(xp.where(xp.diff(table[:, 0]) > 0.0, length, table[1:, 0]))
 
 
 def nodal_loads(rule: Rule, ends: Array, load: Array) -> Array:
@@ -189,25 +193,26 @@ def nodal_loads(rule: Rule, ends: Array, load: Array) -> Array:
     """
     if load.ndim == 0:
         return load * tributary_lengths(rule, ends)
-    value = jnp.concatenate([load[:1, 1], load[:, 1], load[-1:, 1]])  # end values go on beyond
-    before = jnp.minimum(load[0, 0], ends[0]) + ends[0] - ends[-1]
-    after = jnp.maximum(load[-1, 0], ends[-1]) + ends[-1] - ends[0]
-    outer = lax.stop_gradient(jnp.stack([before, after]))  # wherever they are
-    x = jnp.concatenate([outer[:1], load[:, 0], outer[1:]])
-    run = jnp.where(jnp.diff(x) > 0.0, jnp.diff(x), 1.0)
-    begin, end, size = ends[:-1, None], ends[1:, None], jnp.diff(ends)[:, None]
+    xp = numbers_of(ends, load)
+    value = xp.concatenate([load[:1, 1], load[:, 1], load[-1:, 1]])  # end values go on beyond
+    before = xp.minimum(load[0, 0], ends[0]) + ends[0] - ends[-1]
+    after = xp.maximum(load[-1, 0], ends[-1]) + ends[-1] - ends[0]
+    outer = without_slopes(xp.stack([before, after]))  # wherever they are
+    x = xp.concatenate([outer[:1], load[:, 0], outer[1:]])
+    run = xp.where(xp.diff(x) > 0.0, xp.diff(x), 1.0)
+    begin, end, size = ends[:-1, None], ends[1:, None], xp.diff(ends)[:, None]
     # A row at the end of two elements lies in the second one, so that derivatives are one-sided.
-    low = jnp.where(x[:-1] >= begin, x[:-1], begin)
-    high = jnp.where(x[1:] < end, x[1:], end)
-    cut = jnp.where((high >= low) & (low < end), high - low, 0.0)  # (elements, rows + 1)
-    total = jnp.zeros((ends.size - 1, rule.nodes.size), ends.dtype)
+    low = xp.where(x[:-1] >= begin, x[:-1], begin)
+    high = xp.where(x[1:] < end, x[1:], end)
+    cut = xp.where((high >= low) & (low < end), high - low, 0.0)  # (elements, rows + 1)
+    total = xp.zeros((ends.size - 1, rule.nodes.size), ends.dtype)
     for point, weight in zip(*_gauss(2), strict=True):  # exact for linear times quadratic
         points = low + point * cut
-        along = jnp.clip((points - x[:-1]) / run, 0.0, 1.0)
-        part = weight * cut * (value[:-1] + along * jnp.diff(value))
+        along = xp.clip((points - x[:-1]) / run, 0.0, 1.0)
+        part = weight * cut * (value[:-1] + along * xp.diff(value))
         local = (points - begin) / size
-        shapes = jnp.stack([jnp.polyval(s.coef[::-1], local) for s in _shapes(rule.nodes)], -1)
-        total = total + jnp.sum(part[..., None] * shapes, axis=1)
+        shapes = xp.stack([xp.polyval(s.coef[::-1], local) for s in _shapes(rule.nodes)], -1)
+        total = total + xp.sum(part[..., None] * shapes, axis=1)
     return scatter(total)
 
 
@@ -219,7 +224,8 @@ def nodes(rule: Rule, ends: Array) -> Array:
 
 def tributary_lengths(rule: Rule, ends: Array) -> Array:
     """Contact length l_i of each node, (n,); they add up to L."""
-    return scatter(jnp.diff(ends)[:, None] * rule.node_weights.astype(ends.dtype))
+    lengths = numbers_of(ends).diff(ends)
+    return scatter(lengths[:, None] * rule.node_weights.astype(ends.dtype))
 
 
 def gather(nodal: Array, order: int) -> Array:
@@ -232,6 +238,7 @@ def gather(nodal: Array, order: int) -> Array:
 def scatter(elementwise: Array) -> Array:
     """Element contributions (elements, order + 1, ...) summed at the nodes (n, ...)."""
     order = elementwise.shape[1] - 1
+    xp, ends = numbers_of(elementwise), slice(order, None, order)
     inner = elementwise[:, :order].reshape(-1, *elementwise.shape[2:])
-    total = jnp.concatenate([inner, jnp.zeros_like(elementwise[:1, 0])])
-    return total.at[order::order].add(elementwise[:, order])
+    total = xp.concatenate([inner, xp.zeros_like(elementwise[:1, 0])])
+    return put(total, ends, total[ends] + elementwise[:, order])

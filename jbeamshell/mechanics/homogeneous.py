@@ -32,6 +32,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.mechanics.kinematics import Strains
 
 Energy = Callable[[Array, Array, Array, Array, Array], Array]
@@ -185,5 +186,5 @@ def shear_coefficient(nu: ArrayLike) -> Array:
     -----
     Cowper 1966; Brink 2015, eq. 3.53.
     """
-    nu = jnp.asarray(nu)
-    return 10 * (1 + nu) / (12 + 11 * nu)
+    given: Array = numbers_of(nu).asarray(nu)
+    return 10 * (1 + given) / (12 + 11 * given)

@@ -15,11 +15,11 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.polynomial import legendre
 
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.mechanics.section_form import SectionForm
 
 RATIO = 0.15  # of a layer's thickness to that of the layer above it
@@ -50,7 +50,7 @@ def layered_form(material: Material) -> SectionForm:
     The fields are v and w (displacements of the bottom face), then the other displacements along X,
     then those across.  The end load is spread evenly over the height.
     """
-    count = material.thickness.shape[0]
+    xp, count = numbers_of(material), material.thickness.shape[0]
     orders = (*ORDERS, *(ORDER_ABOVE,) * (count - 1))
     layers, fine = len(orders), len(ORDERS)
     share = RATIO ** np.arange(fine - 1, -1, -1.0)
@@ -61,18 +61,18 @@ def layered_form(material: Material) -> SectionForm:
     mass, mixed, slope, integral = _templates(orders)
 
     def summed(weight: Array, template: np.ndarray) -> Array:
-        return jnp.tensordot(weight, jnp.asarray(template), 1)
+        return xp.tensordot(weight, template, 1)
 
     size = layers + 1 + sum(order - 1 for order in orders)
-    zero = jnp.zeros((size, size), h.dtype)
+    zero = xp.zeros((size, size), h.dtype)
     transpose = np.swapaxes(mixed, 1, 2)
-    values = jnp.block([[summed(g / h, slope), zero], [zero, summed(c / h, slope)]])
-    mixed_form = jnp.block([[zero, summed(g, transpose)], [summed(lam, transpose), zero]])
-    slopes = jnp.block([[summed(c * h, mass), zero], [zero, summed(g * h, mass)]])
-    edges = jnp.append(0.0, jnp.cumsum(h))
+    values = xp.block([[summed(g / h, slope), zero], [zero, summed(c / h, slope)]])
+    mixed_form = xp.block([[zero, summed(g, transpose)], [summed(lam, transpose), zero]])
+    slopes = xp.block([[summed(c * h, mass), zero], [zero, summed(g * h, mass)]])
+    edges = xp.append(0.0, xp.cumsum(h))
     middle = 0.5 * edges[-1]
-    even = jnp.pad(jnp.ones(layers + 1), (0, size - layers - 1))
-    heights = jnp.pad(edges - middle, (0, size - layers - 1))
+    even = xp.pad(xp.ones(layers + 1), (0, size - layers - 1))
+    heights = xp.pad(edges - middle, (0, size - layers - 1))
     mean = summed(h, integral[0]) / edges[-1]
     moment = summed(h**2, integral[1]) + summed(h * (edges[:-1] - middle), integral[0])
     rotation = -moment / (2.0 * middle**3 / 3.0)
@@ -85,16 +85,16 @@ def layered_form(material: Material) -> SectionForm:
     pick = np.ix_(place, place)
 
     def along(part: Array | np.ndarray) -> Array:
-        return jnp.append(part, jnp.zeros(size))[place]
+        return xp.append(part, xp.zeros(size))[place]
 
     def across(part: Array | np.ndarray) -> Array:
-        return jnp.append(jnp.zeros(size), part)[place]
+        return xp.append(xp.zeros(size), part)[place]
 
     def squares(layer: int) -> Array:
-        block = summed(jnp.where(kind == layer, h, 0.0), mass)
-        return jnp.block([[block, zero], [zero, block]])[pick]
+        block = summed(xp.where(kind == layer, h, 0.0), mass)
+        return xp.block([[block, zero], [zero, block]])[pick]
 
-    rest = jnp.zeros(2 * size)
+    rest = xp.zeros(2 * size)
     modes = [
         (rest, along(even)),
         (rest, across(even)),
@@ -110,10 +110,10 @@ def layered_form(material: Material) -> SectionForm:
         turn=along(rotation),
         press=across(top),
         held=np.append(np.ones(size, bool), np.zeros(size, bool))[place],
-        further=jnp.stack([along(rotation), across(squeeze) / edges[-1]]),
-        modes=jnp.asarray([jnp.stack(mode) for mode in modes]),
+        further=xp.stack([along(rotation), across(squeeze) / edges[-1]]),
+        modes=xp.asarray([xp.stack(mode) for mode in modes]),
         spread=None,
-        masses=jnp.stack([squares(i) for i in range(count)]),
+        masses=xp.stack([squares(i) for i in range(count)]),
         top=int(np.flatnonzero(place == size + layers)[0]),
     )
 

@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.numbers_of import numbers_of, put
 from jbeamshell.mechanics.kinematics import FIELDS, Section
 from jbeamshell.numerics.factors import inverse_cholesky
 
@@ -62,26 +63,30 @@ class SectionForm(NamedTuple):
     def element(self, lengths: Array) -> Matrices:
         """Matrices (elements, m, m) of elements: start and start, end and end, start and end."""
         h = lengths[:, None, None]
-        spread = jax.vmap(self._relieved)(lengths) if self.spread is None else self.spread
+        spread = self._relieved(h) if self.spread is None else self.spread
         slope, spread = self.slopes / h, h * spread
         mean = 0.25 * h * self.values
         even, odd = 0.5 * (self.mixed + self.mixed.T), 0.5 * (self.mixed - self.mixed.T)
         diagonal = mean + slope + spread
         return diagonal - even, diagonal + even, mean - slope - spread + odd
 
-    def _relieved(self, length: Array) -> Array:
-        """Spread (m, m) of linear fields, relieved by parabolas, in an element of plane elasticity.
+    def _relieved(self, h: Array) -> Array:
+        """Spread (..., m, m) of linear fields, relieved by parabolas, in plane elasticity.
 
         Parabolas of the fields across relieve those along, and the other way round.
+
+        Parameters
+        ----------
+        h : (..., 1, 1) lengths of the elements
         """
-        bubbles = self.slopes + 0.1 * length**2 * self.values
-        found = jnp.zeros_like(self.values)
+        bubbles = self.slopes + 0.1 * h**2 * self.values
+        found = numbers_of(bubbles).zeros_like(bubbles)
         along, across = np.flatnonzero(self.held), np.flatnonzero(~self.held)
         for own, other in ((along, across), (across, along)):
-            inverse = inverse_cholesky(bubbles[np.ix_(other, other)])
+            inverse = inverse_cholesky(bubbles[..., other[:, None], other])
             relief = inverse @ self.mixed[np.ix_(own, other)].T
-            own_values = self.values[np.ix_(own, own)] - relief.T @ relief
-            found = found.at[np.ix_(own, own)].set(own_values / 12.0)
+            own_values = self.values[np.ix_(own, own)] - relief.mT @ relief
+            found = put(found, (..., own[:, None], own), own_values / 12.0)
         return found
 
     def moved(self, length: Array) -> tuple[Array, Array]:
@@ -129,14 +134,16 @@ def on_symmetry_plane(form: SectionForm) -> SectionForm:
         return form
     places = np.delete(np.arange(form.pull.size), form.top)
     relation = -form.press[places] / form.press[form.top]
-    fields = jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, places].at[form.top].set(relation)
-    return _within(form, fields, places)._replace(press=jnp.zeros_like(relation), top=0)
+    unit = numbers_of(relation).eye(form.pull.size, dtype=form.pull.dtype)
+    fields = put(unit[:, places], form.top, relation)
+    return _within(form, fields, places)._replace(press=0.0 * relation, top=0)
 
 
 def without_lift(form: SectionForm) -> SectionForm:
     """Form of a section whose w is zero, and is left out."""
     places = np.delete(np.arange(form.pull.size), W)
-    return _within(form, jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, places], places)
+    unit = numbers_of(form.pull).eye(form.pull.size, dtype=form.pull.dtype)
+    return _within(form, unit[:, places], places)
 
 
 def _within(form: SectionForm, fields: Array, places: np.ndarray) -> SectionForm:
@@ -156,5 +163,5 @@ def _within(form: SectionForm, fields: Array, places: np.ndarray) -> SectionForm
         further=form.further @ fields,
         modes=form.modes[..., places],
         spread=None if form.spread is None else within(form.spread),
-        masses=jax.vmap(within)(form.masses),
+        masses=within(form.masses),
     )

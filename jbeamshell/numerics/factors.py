@@ -11,31 +11,50 @@ Murray, I. (2016). Differentiation of the Cholesky decomposition. arXiv 1602.075
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array, lax
 from jax.custom_batching import sequential_vmap
+from scipy.linalg import lapack
+
+from jbeamshell.common.numbers_of import numbers_of
+
+
+def inverse_cholesky(matrix: Array) -> Array:
+    """Inverse of the lower factor L of symmetric positive definite matrices L L' (..., n, n).
+
+    NaN where a matrix is not positive definite.
+    """
+    if numbers_of(matrix) is jnp:
+        found = _inverse_cholesky
+        for _ in matrix.shape[:-2]:
+            found = jax.vmap(found)
+        return found(matrix)
+    inverse: Any = np.empty_like(matrix)
+    for place in np.ndindex(matrix.shape[:-2]):
+        lower, failed = lapack.dpotrf(matrix[place], lower=1)
+        inverse[place] = np.nan if failed else lapack.dtrtri(lower, lower=1)[0]
+    return inverse
 
 
 @jax.custom_jvp
-def inverse_cholesky(matrix: Array) -> Array:
-    """Inverse of the lower factor L of a symmetric positive definite matrix L L' (n, n).
-
-    NaN where the matrix is not positive definite.
-    """
-    return _inverse_cholesky(matrix)
+def _inverse_cholesky(matrix: Array) -> Array:
+    return _one_by_one(matrix)
 
 
 @sequential_vmap
-def _inverse_cholesky(matrix: Array) -> Array:
+def _one_by_one(matrix: Array) -> Array:
     lower = lax.linalg.cholesky(matrix, symmetrize_input=False)
     one = jnp.eye(matrix.shape[0], dtype=matrix.dtype)
     return lax.linalg.triangular_solve(lower, one, left_side=False, lower=True)
 
 
-@inverse_cholesky.defjvp
+@_inverse_cholesky.defjvp
 def _inverse_cholesky_slope(matrix: tuple[Array], change: tuple[Array]) -> tuple[Array, Array]:
-    inverse = inverse_cholesky(*matrix)
+    inverse = _inverse_cholesky(*matrix)
     between = jnp.tril(inverse @ change[0] @ inverse.T)
     return inverse, -(between - 0.5 * jnp.diag(jnp.diag(between))) @ inverse
 

@@ -19,6 +19,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.mechanics.elements import ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
 from jbeamshell.mechanics.homogeneous import plane_modulus, shear_modulus
@@ -146,7 +147,10 @@ class Member(MemberKeys):
             require(f"member.{name}", value, self.layers is None or value is None, fix)
 
     def beside(self, strip: Strip) -> Strip:
-        """Member as a strip whose contact is its bottom face; what it leaves out is the strip's."""
+        """Member as a strip whose contact is its bottom face; what it leaves out is the strip's.
+
+        Its numbers are of NumPy if theirs are.
+        """
         layered = self.layers is not None
         stiffness, nu = self.axial_stiffness, self.poisson_ratio
         layers = self.layers if layered or stiffness is not None or nu is not None else strip.layers
@@ -160,7 +164,8 @@ class Member(MemberKeys):
                 stiffness = strip.plane_modulus * ratio * strip.length
             if stiffness is not None:
                 values["axial_stiffness"] = stiffness
-        return strip.changed(far_end="guided", **values)
+        made = strip.changed(far_end="guided", **values)
+        return cast(Strip, jax.tree.map(numbers_of(self, strip).asarray, made))
 
 
 class Contact(ContactKeys):
@@ -237,7 +242,8 @@ class Contact(ContactKeys):
         """
         tables = [p for p in (self.pressure, self.bottom_pressure) if p.ndim == 2]
         steps = [table_steps(table, length) for table in tables]
-        return jnp.sort(jnp.concatenate(steps)) if steps else None
+        xp = numbers_of(steps)
+        return xp.sort(xp.concatenate(steps)) if steps else None
 
 
 class Load(LoadKeys):

@@ -104,25 +104,27 @@ def bolt_pressure(bolts: Array, length: Array) -> Array:
     """
     key = "contact.bolts"
     require(key, bolts, bolts.ndim == 2 and bolts.shape[1] == 3, BOLTS)
-    middle, force, width = bolts.T
+    xp: Any = jnp if is_traced(bolts, length) else np  # much faster
+    middle, force, width = xp.asarray(bolts).T
     begin, end = middle - 0.5 * width, middle + 0.5 * width
     kept = np.ones(4 * bolts.shape[0], bool)
-    if not is_traced(bolts, length):
-        good = bool(np.all(np.isfinite(bolts)) and np.all(np.asarray(bolts[:, 1:]) > 0.0))
+    if xp is np:
+        numbers = np.asarray(bolts)
+        good = bool(np.all(np.isfinite(numbers)) and np.all(numbers[:, 1:] > 0.0))
         require(key, bolts, good, "forces and widths must be positive numbers")
         slack = 1e-12 * float(length)
-        inside = bool(begin[0] >= -slack and np.all(np.asarray(end) <= float(length) + slack))
+        inside = bool(begin[0] >= -slack and np.all(end <= float(length) + slack))
         fix = f"a patch lies off the overlap, X from 0 to {float(length):g}: move it or narrow it"
-        require(key, bolts, inside and bool(np.min(np.asarray(begin)) >= -slack), fix)
-        apart = bool(np.all(np.asarray(begin[1:] - end[:-1]) >= -slack))
+        require(key, bolts, inside and bool(np.min(begin) >= -slack), fix)
+        apart = bool(np.all(begin[1:] - end[:-1] >= -slack))
         require(key, bolts, apart, "patches overlap, or X falls: sort the rows and narrow them")
-        touch = 4 * np.flatnonzero(np.asarray(begin[1:] - end[:-1]) <= slack)
+        touch = 4 * np.flatnonzero(begin[1:] - end[:-1] <= slack)
         kept[[*(touch + 3), *(touch + 4)]] = False
     pressure = force / width
-    begin = jnp.maximum(begin, jnp.append(0.0, end[:-1]))  # round-off between patches that touch
+    begin = xp.maximum(begin, xp.append(0.0, end[:-1]))  # round-off between patches that touch
     rows = [(begin, 0.0 * pressure), (begin, pressure), (end, pressure), (end, 0.0 * pressure)]
-    table = jnp.stack([jnp.stack(row, axis=1) for row in rows], axis=1).reshape(-1, 2)
-    return table if kept.all() else table[kept]
+    table = xp.stack([xp.stack(row, axis=1) for row in rows], axis=1).reshape(-1, 2)
+    return jnp.asarray(table if kept.all() else table[kept], bolts.dtype)
 
 
 def check_gap(gap: np.ndarray) -> None:

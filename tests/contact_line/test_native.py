@@ -82,13 +82,13 @@ def test_a_library_that_is_not_there_leaves_the_walk_to_jax(tmp_path, monkeypatc
     monkeypatch.setattr(native, "LIBRARY", tmp_path / "libwalk.so")
     if content is not None:
         native.LIBRARY.write_bytes(content)
-    for known in (native.library, native.serves):
+    for known in (native.library, native.is_taken):
         known.cache_clear()
     try:
         assert not native.serves()
         assert says in native.in_words()
     finally:
-        for known in (native.library, native.serves):
+        for known in (native.library, native.is_taken):
             known.cache_clear()
 
 
@@ -97,12 +97,13 @@ def test_a_refusal_by_jax_is_told_and_leaves_the_walk_to_jax(monkeypatch):
         raise ValueError("another version")
 
     monkeypatch.setattr(jax.ffi, "register_ffi_target", refuse)
-    native.serves.cache_clear()
+    native.is_taken.cache_clear()
     try:
         with pytest.warns(RuntimeWarning, match=r"walked in JAX.*refuses.*another version"):
-            assert not native.serves()
+            assert not native.serves(jnp.zeros(()))
+        assert native.serves(np.zeros(()))  # which JAX has no part in
     finally:
-        native.serves.cache_clear()
+        native.is_taken.cache_clear()
 
 
 @pytest.mark.parametrize(("rounded", "seeds"), [(True, 12), (False, 4)])

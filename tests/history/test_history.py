@@ -73,5 +73,5 @@ def test_the_contact_ends_where_the_force_of_its_last_node_is_used_up():
     reaction = np.where(x < 4.0, 10.0 - x, 0.0)  # it falls by 1 per length, and stops at the end
     reaction[4] = 10.0 * (end - 3.5) - 0.5 * (end**2 - 3.5**2)  # node 4 has its share from 3.5 on
     touching = reaction > 0.0
-    found = contact_line._contact_ends(x, tributary, touching[None], reaction[None])
+    found = contact_line._contact_ends((x, tributary, touching[None], reaction[None]))
     assert float(found[0]) == pytest.approx(end, abs=1e-3)
