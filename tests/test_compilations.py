@@ -51,7 +51,7 @@ def test_a_plain_call_of_plane_elasticity_compiles_no_program(compiled):
     own = {"strip.overhang": 0.7, "contact.bolts": [[0.4, 10.0, 0.3], [1.6, 20.0, 0.3]]}
     compiled()
     assert jb.solve(scene.replace(own), throw=False).figures()["dissipation"] > 0.0
-    assert compiled() == []
+    assert [name for name in compiled() if name.startswith("jit(_")] == []
 
 
 def test_sweeps_share_a_program_whatever_the_scene_s_other_numbers(compiled):
