@@ -11,7 +11,8 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from typing import Any, ParamSpec, TypeVar
 
 import jax
@@ -21,6 +22,32 @@ VARIABLE = "OPENBLAS_NUM_THREADS"  # which `jbeamshell.configure` sets
 PLATFORMS = "JAX_PLATFORMS"
 P = ParamSpec("P")
 R = TypeVar("R")
+
+
+class _Limit:
+    """Limit of LAPACK's threads, which calls that overlap share: the last one lifts it."""
+
+    def __init__(self) -> None:
+        self._lock, self._calls = threading.Lock(), 0
+        self._before: Any = None
+
+    @contextlib.contextmanager
+    def held(self, threads: int) -> Iterator[None]:
+        """Context in which LAPACK has so many threads, or those of the first call in it."""
+        with self._lock:
+            if self._calls == 0:
+                self._before = _lapack().limit(limits=threads)
+            self._calls += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._calls -= 1
+                if self._calls == 0:
+                    self._before.restore_original_limits()
+
+
+_LIMIT = _Limit()
 
 
 def on_one_core(function: Callable[P, R]) -> Callable[P, R]:
@@ -34,7 +61,7 @@ def on_one_core(function: Callable[P, R]) -> Callable[P, R]:
     def limited(*args: P.args, **options: P.kwargs) -> R:
         with _processor():
             said = os.environ.get(VARIABLE, "")
-            with _lapack().limit(limits=int(said) if said.isdigit() else 1):
+            with _LIMIT.held(int(said) if said.isdigit() else 1):
                 return function(*args, **options)
 
     return limited

@@ -201,12 +201,8 @@ def _walk(
 
 def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, turns: Turns) -> Level:
     """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
-    xp, body, friction, member = (
-        numbers_of(scene, strip, targets),
-        strip.body,
-        scene.contact.friction,
-        scene.member,
-    )
+    xp = numbers_of(scene, strip, targets)
+    body, friction, member = strip.body, scene.contact.friction, scene.member
     lift, bearing = strip.lift, member.bearing_stiffness
     if bearing is not None:
         share = (strip.load / xp.sum(strip.load))[::-1]
