@@ -45,6 +45,7 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run a scene, report and write; returns the exit code."""
     from jbeamshell.common import files
+    from jbeamshell.common.progress import seconds_of_compiling
     from jbeamshell.scene import load_path
     from jbeamshell.solving import solve as solving
     from jbeamshell.solving.advice import within
@@ -58,16 +59,13 @@ def run(options: argparse.Namespace) -> int:
         from jbeamshell.plotting.folder import check_folder
 
         folder = check_folder(options.out)
-    say("compiling ... (Ctrl+C stops it)")
-    begin = time.perf_counter()
-    solving.compile_for(scene)
-    compiled = time.perf_counter()
-    say(f"compiled in {compiled - begin:.1f} s, solving ...")
+    say("solving ... (Ctrl+C stops it)")
+    begin, before = time.perf_counter(), seconds_of_compiling()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DoubtfulWarning)  # printed below, one line each
         history = jax.block_until_ready(solving.run(scene))
-    finished = time.perf_counter()
-    timing = {"wall_s": finished - compiled, "compile_s": compiled - begin}
+    compiled = seconds_of_compiling() - before
+    timing = {"wall_s": time.perf_counter() - begin, "compile_s": compiled}
     figures = history.figures() | timing
     units = SI if options.specimen_in_si else {}
     lines = [*options.bolted, history.summary(units).as_text()]

@@ -100,12 +100,12 @@ def patience(what: str) -> Iterator[None]:
 
 
 def _tick(what: str, over: threading.Event) -> None:
-    before = _compiling().seconds
+    before = seconds_of_compiling()
     if over.wait(DELAY):
         return
     with bar(what, bar_format="{desc} ... {elapsed}") as shown:
         while not over.wait(TICK):
-            spent = _compiling().seconds - before
+            spent = seconds_of_compiling() - before
             if spent > WORTH_TELLING:
                 told = f"{spent:.0f} s of it to compile, once for calls of this kind"
                 shown.set_description_str(f"{what}, {told}", refresh=False)
@@ -122,6 +122,11 @@ class _Compiling:
     def _add(self, event: str, duration_secs: float, **_: Any) -> None:
         if event.startswith(COMPILE):
             self.seconds += duration_secs
+
+
+def seconds_of_compiling() -> float:
+    """Seconds for which JAX has traced and compiled in this process since this was asked first."""
+    return _compiling().seconds
 
 
 @functools.cache

@@ -17,7 +17,6 @@ from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
@@ -39,7 +38,7 @@ from jbeamshell.load_steps.recovery import recover
 from jbeamshell.load_steps.stepping import march
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.domain import stays_below
-from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
+from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact
 from jbeamshell.scene.mounting import left_open
 from jbeamshell.scene.planning import refinements
 from jbeamshell.scene.scene import Scene
@@ -275,16 +274,3 @@ def _precise(scene: Scene) -> bool:
     """True if a transformation's precision is enough for a scene on its contact line."""
     few = scene.plan.nodes <= SINGLE_NODES and not scene.plan.elastic
     return few or not is_single(scene)
-
-
-def compile_for(
-    scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
-) -> None:
-    """Compile the programs that `run` needs; only strips on their contact line are solved."""
-    scene = _able(scene, path, None)
-    whole, cycles = whole_path(scene, path)
-    if scene.plan.on_contact_line:
-        _walked(scene, whole, cycles, False, path is None)
-        return
-    given = scene.in_one_form(), None, whole, np.asarray(False)
-    jax.block_until_ready(_stepped(given, solver or Newton()))

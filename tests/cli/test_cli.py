@@ -127,7 +127,6 @@ def test_a_step_without_equilibrium(refused, monkeypatch):
         raise jb.UnconvergedError("load step 3 found no equilibrium: take more")
 
     monkeypatch.setattr(solving, "run", unconverged)
-    monkeypatch.setattr(solving, "compile_for", lambda _: None)
     line = refused("run", "--json", code=3)
     assert line == "load step 3 found no equilibrium: take more"
 
