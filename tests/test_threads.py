@@ -99,7 +99,7 @@ def test_lapack_has_one_thread_while_a_strip_is_solved_and_is_left_as_it_was(mon
     asked = on_one_core(threads)
     with threadpool_limits(2, user_api="blas"):
         monkeypatch.setenv(VARIABLE, "2")
-        assert asked() == {2}
+        assert asked() == {2}  # whatever it says: whoever set it has read it
         monkeypatch.delenv(VARIABLE)
         assert asked() == {1}
         assert threads() == {2}

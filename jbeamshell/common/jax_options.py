@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+from threadpoolctl import threadpool_limits
 
 from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
@@ -74,7 +75,9 @@ def configure(
     if double:
         jax.config.update("jax_enable_x64", True)
     # Matrices here are small: threads of LAPACK would wait for each other longer than they work.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # SciPy reads it when JAX first needs it
+    threads = os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if threads.isdigit():  # NumPy has read it already
+        threadpool_limits(int(threads), user_api="blas")
     folder = _default_cache() if cache is True else cache
     if folder:
         jax.config.update("jax_compilation_cache_dir", str(folder))

@@ -32,11 +32,11 @@ class _Limit:
         self._before: Any = None
 
     @contextlib.contextmanager
-    def held(self, threads: int) -> Iterator[None]:
-        """Context in which LAPACK has so many threads, or those of the first call in it."""
+    def held(self) -> Iterator[None]:
+        """Context in which LAPACK has one thread."""
         with self._lock:
             if self._calls == 0:
-                self._before = _lapack().limit(limits=threads)
+                self._before = _lapack().limit(limits=1)
             self._calls += 1
         try:
             yield
@@ -54,14 +54,15 @@ def on_one_core(function: Callable[P, R]) -> Callable[P, R]:
     """Function that runs on the processor, during which LAPACK has one thread.
 
     A device that ``jax.default_device`` or `PLATFORMS` names stays, and so does the number of
-    threads that `VARIABLE` says.  NumPy does not read that once it is there.
+    threads that `VARIABLE` says.
     """
 
     @functools.wraps(function)
     def limited(*args: P.args, **options: P.kwargs) -> R:
         with _processor():
-            said = os.environ.get(VARIABLE, "")
-            with _LIMIT.held(int(said) if said.isdigit() else 1):
+            if os.environ.get(VARIABLE):
+                return function(*args, **options)
+            with _LIMIT.held():
                 return function(*args, **options)
 
     return limited

@@ -15,7 +15,7 @@ import equinox as eqx
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.numbers_of import numbers_of
+from jbeamshell.common.numbers_of import numbers_of, pad
 from jbeamshell.contact_line.body import Body
 
 WAYS = np.array([1.0, -1.0])  # of the slip that closes each gap
@@ -39,9 +39,9 @@ def with_bearings(body: Body, stiffness: Array, share: Array) -> Body:
         (
             body.K_tt + stiffness * slip @ slip.T,
             xp.concatenate([body.K_tn, stiffness * slip], axis=1),
-            xp.pad(body.K_nn, beside) + xp.diag(xp.pad(stiffness * WAYS**2, (n, 0))),
-            xp.pad(body.f_n, (0, ways)),
-            xp.pad(body.r_0, (0, ways)),
+            pad(body.K_nn, *beside) + xp.diag(pad(stiffness * WAYS**2, (n, 0))),
+            pad(body.f_n, (0, ways)),
+            pad(body.r_0, (0, ways)),
         ),
     )
 

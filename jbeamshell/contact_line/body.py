@@ -19,7 +19,7 @@ import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-from jbeamshell.common.numbers_of import numbers_of, put, scan
+from jbeamshell.common.numbers_of import numbers_of, pad, put, scan
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.contact_line.ends import End
 from jbeamshell.mechanics.section_form import Matrices, SectionForm
@@ -233,7 +233,7 @@ def _begin(
     forces = [none, none, across[:, :2], none, load * form.press[:, None]]
     fields, back, hessian = _of_end(start, xp.concatenate(forces, axis=1), far, 0)
     onwards = back.T @ across[:, 2:]
-    sides = across.T @ fields + xp.pad(end[:, :2], ((0, 0), (2, 1 + load.size)))
+    sides = across.T @ fields + pad(end[:, :2], (0, 0), (2, 1 + load.size))
     carry = end[2:, 2:] - onwards.T @ onwards, sides[2:]
     return carry, (fields[2:], -(back @ onwards)[2:]), hessian
 
@@ -249,11 +249,11 @@ def _finish(
     hessian : (2n+1+p, 2n+1+p) of the energy of its fields in the sides
     """
     xp = numbers_of(carry, loaded)
-    before, sides = (xp.pad(part, ((2, 0), (0, 0))) for part in carry)
+    before, sides = (pad(part, (2, 0), (0, 0)) for part in carry)
     ends = xp.column_stack([-loaded.pull, form.press[:, None] * load])
     count = ends.shape[1]
     forces = _add(sides, ends, -count)
-    before = xp.pad(before, ((0, 0), (2, 0)))
+    before = pad(before, (0, 0), (2, 0))
     fields, _, hessian = _of_end(before, forces, loaded, sides.shape[1] - count - 2)
     return fields[2:], put(hessian, (-count, -count), hessian[-count, -count] - loaded.softness)
 
@@ -274,9 +274,9 @@ def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Arra
     back : (m, k) inverse factor of its free fields' stiffness
     hessian : (sides, sides) of the energy in the sides
     """
-    xp, contact, free = numbers_of(stiffness, end), end.span[:, :2], end.span[:, 2:]
+    contact, free = end.span[:, :2], end.span[:, 2:]
     whole = stiffness + end.stiffness
-    contacts = xp.pad(contact, ((0, 0), (place, forces.shape[1] - 2 - place)))
+    contacts = pad(contact, (0, 0), (place, forces.shape[1] - 2 - place))
     back = free @ inverse_cholesky(free.T @ whole @ free).T
     reduced = back.T @ (forces + whole @ contacts)
     hessian = contacts.T @ forces
@@ -299,8 +299,8 @@ def _wider(sides: Array, columns: int, count: int) -> Array:
     if columns == sides.shape[-1]:
         return sides
     empty = [(0, 0)] * (sides.ndim - 1) + [(0, columns - sides.shape[-1])]
-    xp = numbers_of(sides)
-    return xp.concatenate([xp.pad(sides[..., :-count], empty), sides[..., -count:]], axis=-1)
+    parts = pad(sides[..., :-count], *empty), sides[..., -count:]
+    return numbers_of(sides).concatenate(parts, axis=-1)
 
 
 def _contacts(form: SectionForm, elements: Matrices, loads: Array) -> Array:
@@ -312,8 +312,8 @@ def _contacts(form: SectionForm, elements: Matrices, loads: Array) -> Array:
     start, end, across = (part[:, :2, :2] for part in elements)
     inner = (np.arange(n) > 0) & (np.arange(n) < n - 1)
     start, across = (xp.where(inner[:-1, None, None], part, 0.0) for part in (start, across))
-    diagonal = xp.pad(start, ((0, 1), (0, 0), (0, 0))) + xp.pad(end, ((1, 0), (0, 0), (0, 0)))
-    coupling = xp.pad(across, ((0, 1), (0, 0), (0, 0)))
+    diagonal = pad(start, (0, 1), (0, 0), (0, 0)) + pad(end, (1, 0), (0, 0), (0, 0))
+    coupling = pad(across, (0, 1), (0, 0), (0, 0))
     here, following = (np.eye(n, k=k)[..., None, None] for k in (0, 1))
     blocks = here * diagonal[:, None] + following * coupling[:, None]
     blocks = blocks + np.swapaxes(following, 0, 1) * xp.swapaxes(coupling, 1, 2)

@@ -71,7 +71,7 @@ def in_words() -> str:
 
 
 def serves(*values: object) -> bool:
-    """True if the walk in C is there, and JAX takes it if any array of some pytrees is JAX's."""
+    """True if the walk in C is there, and JAX takes it if any of some arrays is JAX's."""
     return library() is not None and (numbers_of(*values) is np or is_taken())
 
 
@@ -95,7 +95,7 @@ def arguments(
     body: Body, friction: ArrayLike, start: ContactState, forces: ArrayLike, lift: ArrayLike
 ) -> Numbers:
     """Numbers of a path in the order of walk.c, without its flags."""
-    xp = numbers_of(body, friction, start, forces, lift)
+    xp = numbers_of(*jax.tree.leaves((body, friction, start)), forces, lift)
     matrix = xp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
     pull = xp.concatenate([body.f_t, body.f_n])
     reactions = xp.concatenate([start.r_t, start.r_n])
@@ -113,7 +113,7 @@ def levels(given: Numbers, turns: ArrayLike | tuple[bool, ...], rounded: bool) -
     turns : (levels,) True where the load has turned
     rounded : True to read the spline of the events
     """
-    xp = numbers_of(given, turns)
+    xp = numbers_of(*given)
     beside = xp.asarray(turns, bool), xp.asarray(rounded)
     return _levels_at_once(given, beside) if xp is np else _levels(given, beside)
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.numbers_of import numbers_of, put
+from jbeamshell.common.numbers_of import numbers_of, pad, put
 from jbeamshell.contact_line.body import Elimination, Line, Unknown
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky
@@ -124,7 +124,7 @@ def with_shanks(hessian: Array, stiffness: Array, down: Array) -> Array:
     """
     xp = numbers_of(hessian, stiffness, down)
     spread = xp.stack([stiffness * down / xp.sum(down), xp.zeros_like(down)], axis=1)
-    return hessian + xp.diag(xp.pad(spread.ravel(), (0, 2)))
+    return hessian + xp.diag(pad(spread.ravel(), (0, 2)))
 
 
 def together(

@@ -12,7 +12,7 @@ from jax import Array
 from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.common.failed import nan_unless
-from jbeamshell.common.numbers_of import numbers_of, put
+from jbeamshell.common.numbers_of import numbers_of, pad, put
 from jbeamshell.common.precision import doubled, is_single, rounded
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line import native
@@ -245,7 +245,7 @@ def _history(
     ----------
     parts : parts (levels,) of the pressures that act; None is all of them
     """
-    xp, before, state = numbers_of(scene, strip, levels), scene.load.pressure_steps, levels.state
+    xp, before, state = numbers_of(levels.slip_work), scene.load.pressure_steps, levels.state
     steps = before + state.force.size
     part = xp.asarray(np.minimum(np.arange(1, steps + 1) / before, 1.0), state.force.dtype)
     pressure = part if parts is None else xp.append(part[:before], parts)
@@ -258,7 +258,7 @@ def _history(
     status = xp.where(sound, Status.CONVERGED, Status.MAX_ITERATIONS)
 
     def every(values: Array) -> Array:
-        return xp.pad(values, (before, 0))
+        return pad(values, (before, 0))
 
     def masked(values: Array) -> Array:
         return nan_unless(sound, values)
@@ -292,8 +292,8 @@ def _history(
 
 def _along(values: Array, nodes: int, before: int) -> Array:
     """Values (levels, k) as (before + levels, nodes) from the far end, zero before the levels."""
-    empty = (before, 0), (nodes - values.shape[1], 0)
-    return numbers_of(values).pad(values[:, ::-1], empty)
+    found: Array = pad(values[:, ::-1], (before, 0), (nodes - values.shape[1], 0))
+    return found
 
 
 def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: Array) -> Movement:
@@ -305,14 +305,14 @@ def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: 
     pressure : (steps,) part of the pressures that acts
     sound : (steps,) False from the first step on that has no equilibrium
     """
-    xp, n, before = numbers_of(strip, levels, part), strip.x.size, part.size - levels.settled.size
+    xp, n, before = numbers_of(part), strip.x.size, part.size - levels.settled.size
     settled = _along(strip.settled[None], n, 0)[0]
     at_rest = xp.append(xp.stack([settled, strip.lift[::-1]], axis=1), xp.array([0.0, 1.0]))
     slip, rise = (
         _along(values, n, before) for values in (levels.state.v, levels.lift[:, :n] - strip.lift)
     )
     change = xp.stack([slip, rise], axis=2).reshape(part.size, 2 * n)
-    force = xp.pad(levels.state.force, (before, 0))
+    force = pad(levels.state.force, (before, 0))
     change = xp.column_stack([change, force, pressure - part])
     return Movement(at_rest, change, part, sound)
 
@@ -322,7 +322,7 @@ def _energy(
 ) -> tuple[Array, Array]:
     """Stored energy (steps,) with the potential of the pressures, and their sinking."""
     at_rest, change, part, _ = movement
-    xp, n, before = numbers_of(strip, movement), strip.x.size, part.size - state.force.size
+    xp, n, before = numbers_of(change), strip.x.size, part.size - state.force.size
     # Conjugate to v and w, minus the end load, and the pressure.
     resting, added = at_rest @ strip.pressed.hessian, change @ strip.loaded.hessian
     energy = 0.5 * part**2 * (resting @ at_rest) + change @ put(resting, -2, 0.0)
@@ -344,7 +344,7 @@ def _on_base(strip: Strip, state: ContactState, pressing: Array) -> tuple[Array,
     ----------
     pressing : (before,) part of the pressures while they press the strip down
     """
-    xp, n, share = numbers_of(strip, state), strip.x.size, pressing[:, None]
+    xp, n, share = numbers_of(state.r_t), strip.x.size, pressing[:, None]
     r_t = xp.concatenate([share * strip.body.t_0, state.r_t])
     r_n = xp.concatenate([share * strip.body.r_0, state.r_n[:, :n]])
     return -_along(r_t, n, 0) / strip.tributary, r_n[:, ::-1] / strip.tributary

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.numbers_of import numbers_of, put
+from jbeamshell.common.numbers_of import numbers_of, pad, put
 from jbeamshell.contact_line import entry
 from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body, Elimination, Unknown, eliminate
@@ -54,7 +54,7 @@ class Members(NamedTuple):
         sizes = top if pair is None else xp.append(top, bottom)
         hessian = as_one(as_one(self.hessian, sizes).T, sizes)
         if pair is None:
-            lift = xp.pad(xp.stack([xp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+            lift = pad(xp.stack([xp.zeros_like(up), up], axis=1).ravel(), (0, 2))
             from_below = lift[:, None] * np.eye(lift.size)[-1]
             return Members(elimination, hessian - from_below - from_below.T)
         return Members(elimination, hessian, pair.pressed(top, bottom))
@@ -183,7 +183,7 @@ def pressed(scene: Scene, strip: Unpressed) -> Strip:
         lift, settled, reaction = press_down(*stiffness, press_t, press[w], based, gaps)
     if gap is not None:
         under_pressure, under_load = (over_gap(part, gap) for part in (under_pressure, under_load))
-    settled = xp.pad(settled, (0, k_tt.shape[0] - settled.size))
+    settled = pad(settled, (0, k_tt.shape[0] - settled.size))
     hessian = under_load.hessian
     if scene.member.bolt_stiffness is not None:
         hessian = with_shanks(hessian, scene.member.bolt_stiffness, down)

@@ -167,8 +167,8 @@ def walk(
         with the axis of the levels first
     """
     lift = 0.0 * start.r_n if lift is None else lift
-    if forces.dtype == float and native.serves(body, friction, start, forces, lift):
-        given = native.arguments(body, friction, start, forces, lift)
+    given = native.arguments(body, friction, start, forces, lift)
+    if forces.dtype == float and native.serves(*given):
         found = native.levels(given, turns, rounded)
         state = ContactState(found.v, found.r_t, found.r_n, forces, found.displacement)
         return Level(state, found.lift, found.slip_work, found.slipping, found.settled)

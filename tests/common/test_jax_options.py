@@ -11,6 +11,7 @@ from jbeamshell.common import jax_options
 from jbeamshell.common.errors import InputError
 
 CACHE = "JAX_COMPILATION_CACHE_DIR"
+THREADS = "OPENBLAS_NUM_THREADS"
 FAST = f"{jax_options.EXTRA}{jax_options.FAST_LOOPS}"
 
 
@@ -44,6 +45,14 @@ def test_nothing_is_chosen_by_import():
     single = "jbeamshell.configure(double=False, fast_loops=False)"
     assert flags_after({}, f"{single}; {look}") == "False"
     assert flags_after({}, f"jbeamshell.configure(fast_loops=False); {look}") == "True"
+
+
+def test_lapack_of_numpy_and_of_scipy_has_the_threads_that_are_asked_for():
+    told = "[print(one['num_threads']) for one in threadpoolctl.threadpool_info()]"
+    look = "import numpy, threadpoolctl; jbeamshell.configure(); import scipy.linalg; " + told
+    for said in ("1", "2"):
+        assert set(flags_after({THREADS: said}, look).split()[:-1]) == {said}
+    assert set(flags_after({}, look, without=(THREADS,)).split()[:-1]) == {"1"}
 
 
 def test_the_walk_is_in_jax_where_it_is_asked_for_and_says_the_same():
