@@ -54,6 +54,8 @@ def _controls(scene: Scene) -> Iterator[Control]:
     if strip.layers is None:
         key = strip.given_height.key  # as it was given, so that the scene's text stays so
         yield _around(key, HEIGHTS[key], float(scene.get(key)))
+    if strip.width is not None:
+        yield _around("strip.width", "Width b [length]", float(scene.get("strip.width")))
     if scene.member.support != "none" and scene.member.layers is None and strip.layers is None:
         below = float(scene.member.beside(strip).height_ratio)
         yield _around("member.height_ratio", "Height ratio of the lower member η₂", below)

@@ -38,6 +38,8 @@ AMPLITUDES = [float(f"{first}e{power}") for power in range(-12, 13) for first in
 HEIGHT = 300
 ARROW = 0.03  # of the picture's width, from the pulled end to its arrow
 GREY = 0.35  # opacity of a picture that is out of date
+LESS = "{} less F/K"
+NOTHING = np.zeros(0), np.zeros(0)
 
 
 class Figures:
@@ -60,6 +62,7 @@ class Figures:
         self._sources: dict[str, ColumnDataSource] = {}
         self._factor = 0.0
         self._view: View | None = None
+        self._less, self._loops = False, dict.fromkeys(("loop", "kept", "measured"), NOTHING)
         self.contact = self._contact_figure() if self.cyclic else self._profile_figure()
         self.deformed = self._deformed_figure()
         self.loop = self._loop_figure() if self.cyclic else self._gap_figure()
@@ -213,9 +216,9 @@ class Figures:
         history, scene = view.history, view.history.scene
         x = np.asarray(history.x)
         if self.cyclic:
-            self.put("loop", u=view.displacement, F=view.force)
+            self._loops["loop"] = view.displacement, view.force
             self.loop.title.text = f"Hysteresis loop: D = {view.figures['dissipation']:.4g}"
-            self._fit_loop()
+            self._draw_loops()
             self._show_states(view, x)
             amplitude = float(scene.get("load.amplitude"))
             work = view.figures["dissipation"]
@@ -266,7 +269,8 @@ class Figures:
         load = f"{times} at {self._load[0]} = {force:.4g}"
         self.deformed.title.text = load if self.cyclic else times
         if self.cyclic:
-            self.put("here", u=view.displacement[[moment]], F=view.force[[moment]])
+            here = view.displacement[[moment]] - self._flexibility * view.force[[moment]]
+            self.put("here", u=here, F=view.force[[moment]])
             self._now.location = moment
 
     def show_curve(self, curve: Curve | None) -> None:
@@ -283,18 +287,37 @@ class Figures:
         gap = np.array([np.nan])
         u = [part for loop in loops for part in (loop.displacement, gap)]
         force = [part for loop in loops for part in (loop.force, gap)]
-        self.put("measured", u=np.concatenate([gap, *u]), F=np.concatenate([gap, *force]))
+        self._loops["measured"] = np.concatenate([gap, *u]), np.concatenate([gap, *force])
         driver = "force" if self._view is None else self._view.history.scene.load.control
         closed = [loop for loop in loops if loop.closed and loop.work > 0.0]
         sizes = [0.5 * float(np.ptp(getattr(loop, driver, loop.force))) for loop in closed]
         self.put("measured works", A=sizes, D=[loop.work for loop in closed])
-        self._fit_loop()
+        self._draw_loops()
 
     def keep(self, kept: bool) -> None:
         """Keep the loop and the curve of now as grey lines to compare with, or drop them."""
-        for now, before in (("loop", "kept"), ("curve", "kept curve")):
-            data = self.source(now).data
-            self.put(before, **{k: v if kept else [] for k, v in data.items()})
+        self._loops["kept"] = self._loops["loop"] if kept else NOTHING
+        self.put(
+            "kept curve", **{k: v if kept else [] for k, v in self.source("curve").data.items()}
+        )
+        self._draw_loops()
+
+    def less_stiffness(self, wanted: bool, moment: int) -> None:
+        """Draw loops less F/K of the model's secant stiffness K, or as they are.
+
+        The loop of a joint that hardly slips is as thin as a line otherwise.
+        """
+        self._less = wanted
+        self.loop.xaxis.axis_label = LESS.format(self._moved) if wanted else self._moved
+        self._draw_loops()
+        self.at(moment)
+
+    @property
+    def _flexibility(self) -> float:
+        """Displacement for each unit of load that is taken from the loops."""
+        if self._view is None or not self._less:
+            return 0.0
+        return 1.0 / self._view.figures["secant_stiffness"]
 
     def grey(self, stale: bool) -> None:
         """Grey the figures whose numbers are out of date, or not."""
@@ -327,9 +350,12 @@ class Figures:
         labels = {tick: f"{view.force[tick] + 0.0:.4g}" for tick in ticks}
         self.contact.yaxis.major_label_overrides = labels
 
-    def _fit_loop(self) -> None:
+    def _draw_loops(self) -> None:
+        """Draw the loops of the model, the one that is kept, and those that were measured."""
         if not self.cyclic:
             return
+        for name, (moved, force) in self._loops.items():
+            self.put(name, u=moved - self._flexibility * force, F=force)
         for axis, column in ((self.loop.x_range, "u"), (self.loop.y_range, "F")):
             names = ("loop", "kept", "measured")
             _fit(axis, np.concatenate([np.asarray(self.source(n).data[column]) for n in names]))

@@ -119,6 +119,10 @@ class Page:
             **wide,
         )
         self._moment.param.watch(lambda event: self._figures.at(event.new), "value")
+        self._less = pn.widgets.Toggle(label="Loop less its stiffness", **wide)
+        self._less.param.watch(
+            lambda event: self._figures.less_stiffness(event.new, self._moment.value), "value"
+        )
         self._file = pn.widgets.FileInput(accept=".csv,.txt,.tsv,.npz,.mat", **wide)
         self._file.param.watch(lambda _: self._read_file(), "value")
         words = pn.pane.HTML("<b>Your own loops</b> (CSV with columns force and displacement)")
@@ -135,6 +139,7 @@ class Page:
             self._scenes,
             self._sliders,
             pn.Row(self._reset, self._keep, sizing_mode="stretch_width"),
+            self._less,
             self._moment,
             self._data,
             self._take,
@@ -156,9 +161,9 @@ class Page:
         self._values = {control.name: control.value for control in self._controls}
         self.scene, self.view, self.message = scene, None, ""
         self._figures = Figures(scene.load, scene.strip.width is not None)
-        for each in (self._moment, self._keep, self._data):
+        for each in (self._moment, self._keep, self._less, self._data):
             each.visible = bool(scene.load.cycles)
-        self._keep.value = False
+        self._keep.value = self._less.value = False
         self.sliders = {
             control.name: _Slider(
                 label=control.label,

@@ -23,6 +23,15 @@ def test_a_strip_has_five_sliders_and_a_joint_its_bolts():
     assert "contact.pressure" not in joint
 
 
+def test_a_width_has_a_slider_which_spreads_the_same_force():
+    scene = jb.Scene().of_width(60.0)
+    (width,) = (control for control in controls_of(scene) if control.name == "strip.width")
+    assert width.value == pytest.approx(60.0)
+    wider = scene_at(scene, {"strip.width": 120.0})
+    assert float(wider.get("load.amplitude")) == pytest.approx(float(scene.get("load.amplitude")))
+    assert largest_force(wider) == pytest.approx(2.0 * largest_force(scene))
+
+
 def test_a_scene_that_is_only_pressed_has_no_load_and_layers_no_height():
     assert names_of(library.receding()) == ["strip.half_height", FACTOR, "strip.poisson_ratio"]
     assert names_of(library.bimaterial()) == ["contact.pressure"]

@@ -100,6 +100,20 @@ def test_measured_loops_and_kept_curves_lie_over_the_loop(page):
     assert drawn(page, "kept")["u"].size == 0
 
 
+def test_loops_less_their_stiffness_keep_their_area_and_stand_upright(page):
+    whole, measured = drawn(page, "loop"), drawn(page, "measured")
+    page._less.value = True
+    loop, stiffness = drawn(page, "loop"), page.view.figures["secant_stiffness"]
+    assert loop["u"] == pytest.approx(whole["u"] - whole["F"] / stiffness, abs=1e-12)
+    work = [np.trapezoid(one["F"], one["u"]) for one in (loop, whole)]
+    assert work[0] == pytest.approx(work[1], rel=1e-9)
+    ends = loop["u"][np.argmax(loop["F"])], loop["u"][np.argmin(loop["F"])]
+    assert np.ptp(ends) < 1e-3 * np.ptp(whole["u"])  # one cycle is not closed yet
+    assert page._figures.loop.xaxis[0].axis_label.endswith("less F/K")
+    page._less.value = False
+    np.testing.assert_array_equal(drawn(page, "measured")["u"], measured["u"])
+
+
 def test_a_file_that_is_no_table_is_one_line(page):
     page._file.param.update(value=b"\x00\x01 no table", filename="odd.csv")
     assert re.search(r'role="alert".*odd\.csv', page._head.object)
