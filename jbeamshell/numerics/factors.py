@@ -34,7 +34,7 @@ def inverse_cholesky(matrix: Array) -> Array:
             found = jax.vmap(found)
         return found(matrix)
     inverse: Any = np.empty_like(matrix)
-    for place in np.ndindex(matrix.shape[:-2]):
+    for place in np.ndindex(matrix.shape[:-2] if matrix.size else 0):  # LAPACK complains of none
         lower, failed = lapack.dpotrf(matrix[place], lower=1)
         inverse[place] = np.nan if failed else lapack.dtrtri(lower, lower=1)[0]
     return inverse
