@@ -29,7 +29,7 @@ from jbeamshell.bodies.contact import solve_contact
 from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.plotting.style import DATA, PALETTE, style
 
-FACES = ((9, 4), (14, 9), (19, 19), (39, 19), (49, 39))  # bricks along and across the face
+FACES = ((9, 4), (14, 9), (19, 19), (39, 19))  # bricks along and across the face
 LAYERS = 3
 BESIDE = 150  # pairs up to which CalculiX runs
 CALLS = 3
