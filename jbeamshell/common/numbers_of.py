@@ -69,7 +69,7 @@ def scan(
 
 
 def while_loop(unfinished: Callable[[Any], Any], step: Callable[[Any], Any], start: Any) -> Any:
-    """What a loop ends with; see `jax.lax.while_loop`."""
+    """Last state of a loop that starts with ``start``; see `jax.lax.while_loop`."""
     if numbers_of(start) is jnp:
         return lax.while_loop(unfinished, step, start)
     while unfinished(start):

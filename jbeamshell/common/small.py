@@ -81,7 +81,8 @@ class Small:
         leaves, tree = jax.tree.flatten(given)
         if not is_staged():
             if numbers_of(*leaves) is np and self._by_numpy(given):
-                return self._function(given, *static)
+                with np.errstate(all="ignore"):  # JAX says nothing of 0/0 and overflow either
+                    return self._function(given, *static)
             if all(map(_is_number, leaves)):
                 return self._quick(leaves, tree, static)
         return self._inside(given, *static)
