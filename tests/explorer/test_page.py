@@ -32,7 +32,9 @@ def made(scene):
 
 @pytest.fixture
 def page(made):
+    """Page as it was, in whatever order the tests come that share it."""
     made.reset()
+    made._figures.show_loops(example_loops(amplitudes=(0.5851, 1.0)))
     return made
 
 
