@@ -187,6 +187,7 @@ def _state(path):
     runs = saved_runs(path).read()
     if len(runs) < 4:
         raise jb.InputError("a run is left out")
+    runs = sorted(runs, key=lambda run: run[0].tolist())  # in any order they are the same runs
     return [array for values, run in runs for array in (values, *run)]
 
 

@@ -90,6 +90,14 @@ def contact_points(upper: Substructure, lower: Substructure | None, pairs: bool)
     return made._replace(lower=Shares(same[made.upper.nodes], made.upper.values))
 
 
+def in_order(lower: Substructure, made: ContactPoints) -> NDArray[np.int64]:
+    """Nodes (n,) of the lower body that match those of the upper one, pair by pair."""
+    assert made.lower is not None
+    order = np.arange(lower.places.shape[0])
+    order[made.upper.nodes] = made.lower.nodes
+    return order
+
+
 def check_match(upper: Substructure, lower: Substructure) -> None:
     """Refuse contacts whose nodes or normals do not match in turn."""
     ours, theirs = upper.places.shape, lower.places.shape

@@ -1,15 +1,19 @@
-"""Law of one contact point: unilateral contact and Coulomb friction in two directions, on springs.
+"""Law of the contact points of a face: unilateral contact and Coulomb friction, on springs.
 
-With v = (v_1, v_2, v_n) the displacement of the upper body over the lower one, lambda the force
-that the contact puts on the upper body, s the slip so far, and k_t and k_n the springs of the
-point,
+Each point hangs on springs k_t and k_n.  With v = (v_1, v_2, v_n) the displacement of the upper
+body over the lower one and s that of the springs' other end, the contact puts the force
+
+    lambda = k (s - v)
+
+on the upper body.  It has
 
     lambda_n / k_n + h log(1 + lambda_n / F_0) = max(0, -(gap + v_n)),
-    lambda_t = projection of -k_t (v_t - s) on the disc of radius mu lambda_n,
+    lambda_t = projection of k_t (s_t - v_t) on the disc of radius mu lambda_n,
 
 the logarithm for rough surfaces, whose heights are exponential (Greenwood and Williamson 1966).
-After the step the slip is s = v_t + lambda_t / k_t.  What the springs give way by is taken out of
-the bodies (`jbeamshell.bodies.face_springs`), so that they are no penalty (compare Alart and
+The slip s_t therefore stays where a point sticks, and s_n is -gap where a smooth one is closed: the
+law only moves s where a point slides, opens or is rough.  What the springs give way by is taken out
+of the bodies (`jbeamshell.bodies.face_springs`), so that they are no penalty (compare Alart and
 Curnier 1991, where k is their rho).
 """
 
@@ -17,8 +21,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
-from jax import Array, lax
+import numpy as np
+from jax import Array
+
+from jbeamshell.common.numbers_of import numbers_of, without_slopes
 
 NEWTON = 8  # iterations for the force of rough surfaces; six find 15 digits
 
@@ -40,43 +46,85 @@ class Points(NamedTuple):
     roughness: Array
     springs: Array
 
+    @property
+    def stiffness(self) -> Array:
+        """Stiffness (q, 3) of the springs in each direction."""
+        return self.springs[:, np.array([0, 0, 1])]
 
-def contact_force(move: Array, slip: Array, point: Points) -> Array:
-    """Force (3,) on the upper body at a displacement (3,) of one point.
+
+def slip_at(move: Array, slip: Array, points: Points) -> Array:
+    """Slip s (..., q, 3) of contact points: two tangential ones, and that of the normal.
 
     Parameters
     ----------
-    move : v
-    slip : (2,) s at the end of the last step
-    point : numbers of this point
+    move : v (..., q, 3)
+    slip : s (..., q, 3) at the end of the last step, of which the law takes the tangential part
+    points : numbers of the points
     """
-    k_t, k_n = point.springs
-    normal = _normal_force(-(point.gap + move[2]), k_n, *point.roughness)
-    trial = -k_t * (move[:2] - slip)
-    square, radius = jnp.sum(trial**2), point.friction * normal
+    xp = numbers_of(move)
+    trial, size, radius, slides = _friction(move, slip, points)
+    slid = move[..., :2] + trial * (radius / (points.springs[:, 0] * size))[..., None]
+    tangential = xp.where(slides[..., None], slid, slip[..., :2])
+    v_n, smooth = move[..., 2], points.roughness[:, 0] == 0.0
+    normal = v_n + _normal_force(-(points.gap + v_n), points) / points.springs[:, 1]
+    closed = smooth & (points.gap + v_n <= 0.0)
+    normal = xp.where(closed, -points.gap, normal)  # to the last digit
+    return xp.concatenate([tangential, normal[..., None]], axis=-1)
+
+
+def slip_slopes(move: Array, slip: Array, points: Points) -> Array:
+    """Slopes (q, 3, 3) of `slip_at` by v, zero where a smooth point sticks."""
+    xp = numbers_of(move)
+    trial, size, radius, slides = _friction(move, slip, points)
+    k_t, k_n = points.springs.T
+    height, reference = points.roughness.T
+    depth = -(points.gap + move[:, 2])
+    touches = depth >= 0.0
+    force = _normal_force(depth, points)
+    stiff = xp.where(touches, 1.0 / (1.0 / k_n + height / (reference + force)), 0.0)
+    way = trial / size[:, None]
+    across = np.eye(2) - way[:, :, None] * way[:, None, :]
+    turned = np.eye(2) - (radius / size)[:, None, None] * across
+    by_normal = -way * (points.friction * stiff / k_t)[:, None]
+    top = xp.concatenate([turned, by_normal[:, :, None]], axis=2)
+    top = xp.where(slides[:, None, None], top, 0.0)
+    rough = xp.where(height == 0.0, xp.where(touches, 0.0, 1.0), 1.0 - stiff / k_n)
+    bottom = rough[:, None, None] * np.array([0.0, 0.0, 1.0])
+    return xp.concatenate([top, bottom], axis=1)
+
+
+def _friction(move: Array, slip: Array, points: Points) -> tuple[Array, Array, Array, Array]:
+    """Force of the springs without slip, its size, its bound, and True where it is beyond."""
+    xp = numbers_of(move)
+    trial = points.springs[:, :1] * (slip[..., :2] - move[..., :2])
+    square = xp.sum(trial**2, axis=-1)
+    radius = points.friction * _normal_force(-(points.gap + move[..., 2]), points)
     slides = square > radius**2
-    size = jnp.sqrt(jnp.where(slides, square, 1.0))
-    return jnp.append(jnp.where(slides, trial * (radius / size), trial), normal)
+    return trial, xp.sqrt(xp.where(slides, square, 1.0)), radius, slides
 
 
-def _normal_force(depth: Array, spring: Array, height: Array, reference: Array) -> Array:
-    """Normal force at a depth, from y = log(1 + force / F_0) by Newton's method.
+def _normal_force(depth: Array, points: Points) -> Array:
+    """Normal force at a depth (..., q), from y = log(1 + force / F_0) by Newton's method.
 
     The left side is convex in y, and the search starts above the root, so that it never fails.
     """
+    xp = numbers_of(depth)
+    spring, (height, reference) = points.springs[:, 1], points.roughness.T
     touches = depth >= 0.0
-    depth = jnp.where(touches, depth, 0.0)
+    depth = xp.where(touches, depth, 0.0)
+    rough = height > 0.0
+    if xp is np and not np.any(rough):  # most are smooth
+        return depth * spring
 
     def closer(y: Array, last: Array) -> Array:
         soft = reference / spring
-        above = soft * jnp.expm1(last) + height * last - depth
-        return y - above / lax.stop_gradient(soft * jnp.exp(last) + height)
+        above = soft * xp.expm1(last) + height * last - depth
+        return y - above / without_slopes(soft * xp.exp(last) + height)
 
-    alone = jnp.log1p(depth * spring / reference)
-    rough = height > 0.0
-    y = jnp.where(rough, jnp.minimum(alone, depth / jnp.where(rough, height, 1.0)), alone)
-    y = lax.stop_gradient(y)
+    alone = xp.log1p(depth * spring / reference)
+    y = xp.where(rough, xp.minimum(alone, depth / xp.where(rough, height, 1.0)), alone)
+    y = without_slopes(y)
     for _ in range(NEWTON):
-        y = lax.stop_gradient(closer(y, y))
+        y = without_slopes(closer(y, y))
     # The last iteration has the slopes of the root.
-    return jnp.where(touches, reference * jnp.expm1(closer(y, y)), 0.0)
+    return xp.where(touches, reference * xp.expm1(closer(y, y)), 0.0)

@@ -19,16 +19,15 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 
-from jbeamshell.numerics.factors import inverse_cholesky, solve
+from jbeamshell.common.numbers_of import numbers_of, scan, summed
+from jbeamshell.numerics.factors import half_solved, solver
 
 PART = 0.5  # of the flexibility of the nodes' shortest wave, that lies in the springs
 WAVES = 40  # iterations for the shortest wave; `PART` leaves room for what they miss
 EVEN = 0.05  # least spring over the largest one, below which all points have the same
-HELD = 1e2  # stiffness of what a coarser mesh cannot do, over the largest of the body
 
 
 class Side(NamedTuple):
@@ -52,7 +51,8 @@ class Sprung(NamedTuple):
 
     Attributes
     ----------
-    hessian : (3n + m, 3n + m) second derivatives of the body's potential, without the springs
+    hessian : (3n + m, 3n + m) second derivatives of the body's potential, without the springs; on a
+        coarser mesh (3c + m, 3c + m)
     softness : (q, 2) displacement per force of the springs, tangential and normal
     """
 
@@ -60,7 +60,9 @@ class Sprung(NamedTuple):
     softness: Array
 
 
-def sprung(hessian: Array, side: Side, fixed: np.ndarray, coarse: Array) -> Sprung:
+def sprung(
+    hessian: Array, side: Side, fixed: np.ndarray, coarse: np.ndarray | None = None
+) -> Sprung:
     """Body on springs.
 
     Parameters
@@ -68,64 +70,57 @@ def sprung(hessian: Array, side: Side, fixed: np.ndarray, coarse: Array) -> Spru
     hessian : (3n + m, 3n + m) second derivatives of the body's potential, in nodes and loads
     side : its contact points
     fixed : (3n,) True for displacements that a support holds
-    coarse : (3n, 3n) displacements of the nodes from those that stay in a coarser mesh, to which
-        the body is held, its other columns zero; of a body that is free, the unit matrix
+    coarse : (3n, 3c) displacements of the nodes from those that stay in a coarser mesh, which the
+        body then has alone; None where all stay
     """
+    xp = numbers_of(hessian, side)
     size, crossed = fixed.size, fixed | fixed[:, None]
-    k = jnp.where(crossed, 0.0, hessian[:size, :size])
-    f = jnp.where(fixed[:, None], 0.0, -hessian[:size, size:])
+    k = xp.where(crossed, 0.0, hessian[:size, :size])
+    f = xp.where(fixed[:, None], 0.0, -hessian[:size, size:])
     per_area = _shape(k, side)
     springs = (side.areas[:, None] / per_area)[:, np.array([0, 0, 1])]
-    each = jnp.einsum("qkia,qi,qlib->qkalb", side.shares, springs, side.shares)
-    places = 3 * side.nodes[:, :, None] + np.arange(3)
-    rows = jnp.broadcast_to(places[:, :, :, None, None], each.shape)
-    columns = jnp.broadcast_to(places[:, None, None], each.shape)
-    h = jnp.zeros((size, size)).at[rows, columns].add(each)
-    alone = np.diag(fixed.astype(float)) * jnp.max(h)
-    h = jnp.where(crossed, 0.0, h) + alone
-    lost = jnp.diag(jnp.all(coarse == 0.0, axis=0).astype(float))
-    k, f = coarse.T @ k @ coarse, coarse.T @ f
-    h = coarse.T @ h @ coarse
-    h += lost * jnp.max(h)
+    shares = side.shares.swapaxes(1, 2).reshape(len(springs), 3, -1)
+    each = shares.swapaxes(1, 2) @ (springs[:, :, None] * shares)
+    places = (3 * side.nodes[:, :, None] + np.arange(3)).reshape(len(springs), -1)
+    flat = places[:, :, None] * size + places[:, None, :]
+    h = summed(each, flat, size**2).reshape(size, size)
+    h = xp.where(crossed, 0.0, h)
+    if coarse is not None:
+        k, f, h = coarse.T @ k @ coarse, coarse.T @ f, coarse.T @ h @ coarse
+    alone = xp.diag(h) == 0.0
+    h += xp.diag(alone * xp.max(h))
     longest = _shortest_wave(k, h)
-    h = h * longest / PART
-    inverse = inverse_cholesky(h - k)
-    both = inverse @ jnp.column_stack([k, f])
-    on_k, on_f = both[:, : len(k)], both[:, len(k) :]
+    both = xp.column_stack([k, f])
+    on_k, on_f = xp.split(half_solved(h * (longest / PART) - k, both), [len(k)], axis=1)
     k, f = k + on_k.T @ on_k, f + on_k.T @ on_f
     c = -hessian[size:, size:] - on_f.T @ on_f
-    onto = solve(coarse.T @ coarse + lost, coarse.T)
-    rest = np.eye(size) - coarse @ onto
-    k = onto.T @ k @ onto + HELD * jnp.max(k) * rest.T @ rest
-    f = onto.T @ f
-    found = jnp.block([[k, -f], [-f.T, -c]])
-    return Sprung(found, per_area * PART / longest / side.areas[:, None])
+    found = xp.concatenate([xp.column_stack([k, -f]), xp.column_stack([-f.T, -c])])
+    return Sprung(found, per_area * (PART / longest) / side.areas[:, None])
 
 
 def _shape(k: Array, side: Side) -> Array:
     """Displacement per traction (q, 2) of the points, from the nodes' stiffness; up to a factor."""
-    own = jnp.diag(k).reshape(-1, 3)
-    own = jnp.stack([jnp.max(own[:, :2], axis=1), own[:, 2]], axis=1)
-    own = jnp.where(own > 0.0, own, jnp.max(own))
-    squares = side.values**2
-    share = jnp.zeros(len(own)).at[side.nodes].add(squares * side.areas[:, None])
-    share = share * jnp.sum(side.areas) / jnp.sum(share)
+    xp = numbers_of(k, side)
+    own = xp.diag(k).reshape(-1, 3)
+    own = xp.stack([xp.max(own[:, :2], axis=1), own[:, 2]], axis=1)
+    own = xp.where(own > 0.0, own, xp.max(own))
+    share = summed(side.values**2 * side.areas[:, None], side.nodes, len(own))
+    share = share * xp.sum(side.areas) / xp.sum(share)
     soft = share[:, None] / own
     # Shape functions can follow what the springs give way by under an even pressure.
-    found = jnp.einsum("qk,qkw->qw", side.values, soft[side.nodes])
-    even = jnp.min(found, axis=0) > EVEN * jnp.max(found, axis=0)
-    return jnp.where(even, found, jnp.min(soft, axis=0))
+    found = xp.sum(side.values[:, :, None] * soft[side.nodes], axis=1)
+    even = xp.min(found, axis=0) > EVEN * xp.max(found, axis=0)
+    return xp.where(even, found, xp.min(soft, axis=0))
 
 
 def _shortest_wave(k: Array, h: Array) -> Array:
     """Largest eigenvalue of k over h."""
-    inverse = inverse_cholesky(h)
-    start = jnp.asarray(np.random.default_rng(0).normal(size=len(k)))
+    xp, solved = numbers_of(k, h), solver(h)
+    wave = xp.asarray(np.random.default_rng(0).normal(size=len(k)))
 
-    def step(wave: Array, _: None) -> tuple[Array, None]:
-        found = inverse @ (k @ (inverse.T @ wave))
-        return found / jnp.linalg.norm(found), None
+    def step(wave: Array, _: Any) -> tuple[Array, None]:
+        found = solved(k @ wave)
+        return found / xp.linalg.norm(found), None
 
-    wave, _ = lax.scan(step, start, None, length=WAVES)
-    wave = inverse.T @ wave
+    wave = scan(step, wave, xp.arange(WAVES))[0]
     return (wave @ k @ wave) / (wave @ h @ wave)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.common.checks import TINY, require
+from jbeamshell.common.numbers_of import numbers_of, pad
 from jbeamshell.contact_line.pair import together
 
 RIGID = 1e-6  # energy of a rigid motion over that of the nodes alone, from which on it is held
@@ -32,10 +32,11 @@ def joined(upper: Substructure, lower: Substructure | None) -> Array:
 def potential_of(body: Substructure, count: int) -> Array:
     """Second derivatives of a body's potential, on as many loads as both bodies have."""
     missing = (0, count - body.forces.shape[1])
-    forces = -jnp.pad(body.forces, ((0, 0), missing))
-    return jnp.block(
-        [[body.stiffness, forces], [forces.T, -jnp.pad(body.flexibility, (missing,) * 2)]]
-    )
+    forces, flexible = -pad(body.forces, (0, 0), missing), -pad(body.flexibility, missing, missing)
+    xp = numbers_of(body)
+    rows = xp.column_stack([body.stiffness, forces]), xp.column_stack([forces.T, flexible])
+    found: Array = xp.concatenate(rows)
+    return found
 
 
 def grounded(upper: Substructure, lower: Substructure) -> Substructure:

@@ -51,6 +51,6 @@ class Found(NamedTuple):
     """
 
     levels: Levels
-    cycles: Array
+    cycles: Array | int
     coarse: Levels | None = None
     coarser: Levels | None = None

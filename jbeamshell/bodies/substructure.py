@@ -21,6 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from jbeamshell.bodies.face_elements import CORNERS
 from jbeamshell.common.arrays import read_arrays, write_arrays
@@ -38,6 +39,9 @@ from jbeamshell.common.files import as_path, check_regular
 NEGATIVE = 1e-9  # of the largest eigenvalue: further below zero a mode is negative
 LOOSE = {1: 1e-11, 2: 1e-9}  # of the largest eigenvalue: below it a mode costs no energy
 BENT = 1e-3  # part of a motion without energy that may be no rigid one
+LARGE = 400  # displacements, from which on not all eigenvalues are found
+LOOSE_AT_MOST, ITERATIONS = 12, 8  # motions that are sought among so many, and their iterations
+CLEAR = 10.0  # times the bound, further than which from it an eigenvalue is told
 MODES = ("moves along X", "moves along the normal", "turns")
 NAMES = ("places", "normals", "tributary", "stiffness", "forces", "flexibility")
 NONE = -1  # in place of a node, in rows of elements with fewer nodes than others
@@ -279,9 +283,32 @@ def frames_of(normals: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def loose_motions(stiffness: NDArray[np.float64], least: float) -> NDArray[np.float64]:
     """Eigenvectors (size, count) whose energy is below the least part of the largest one."""
+    found = _few_loose(stiffness, least) if len(stiffness) >= LARGE else None
+    if found is not None:
+        return found
     values, vectors = np.linalg.eigh(stiffness)
     loose: NDArray[np.float64] = vectors[:, values < least * values[-1]]
     return loose
+
+
+def _few_loose(stiffness: NDArray[np.float64], least: float) -> NDArray[np.float64] | None:
+    """The same by inverse iterations of few vectors; None where they do not tell it clearly."""
+    size = len(stiffness)
+    start = np.random.default_rng(0).normal(size=(size, LOOSE_AT_MOST))
+    wave = start[:, 0]
+    for _ in range(ITERATIONS):
+        wave = stiffness @ (wave / np.linalg.norm(wave))
+    largest = float(np.linalg.norm(wave))  # a little less than the largest eigenvalue
+    shifted = stiffness + least * largest * np.eye(size)
+    lower, failed = lapack.dpotrf(shifted, lower=1, overwrite_a=1)
+    if failed:
+        return None
+    for _ in range(ITERATIONS):
+        start = np.linalg.qr(lapack.dpotrs(lower, start, lower=1)[0])[0]
+    values, turns = np.linalg.eigh(start.T @ stiffness @ start)
+    over = values / (least * largest)
+    unclear = np.any((over > 1.0 / CLEAR) & (over < CLEAR)) or over[-1] < 1.0
+    return None if unclear else start @ turns[:, over < 1.0]
 
 
 def loose_mode(body: Substructure, stiffness: NDArray[np.float64]) -> str:
@@ -305,5 +332,10 @@ def _check_energy(key: str, matrix: np.ndarray, free: np.ndarray, least: float, 
     apart, size = (float(np.max(np.abs(part))) for part in (matrix - matrix.T, matrix))
     same = apart <= 1e-8 * size
     require(key, f"max|K - K'| {apart:.3g}", same, "is not symmetric: mirror it")
-    values = np.linalg.eigvalsh(matrix[np.ix_(free, free)])
+    part = matrix[np.ix_(free, free)]
+    # Above zero after so small a shift: that is quickly seen.
+    shifted = part + least * np.max(np.diag(part), initial=0.0) * np.eye(len(part))
+    if len(part) >= LARGE and not lapack.dpotrf(shifted, lower=1, overwrite_a=1)[1]:
+        return
+    values = np.linalg.eigvalsh(part)
     require(key, f"least eigenvalue {values[0]:.3g}", values[0] >= -least * values[-1], fix)

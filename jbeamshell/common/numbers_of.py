@@ -47,6 +47,24 @@ def pad(array: Any, *widths: tuple[int, int]) -> Any:
     return wide
 
 
+def summed(values: Any, places: Any, size: int) -> Any:
+    """Sums (..., size) of the values (..., *places.shape) that have the same place."""
+    shape = *values.shape[: values.ndim - places.ndim], size
+    if numbers_of(values) is jnp:
+        return jnp.zeros(shape).at[..., places].add(values)
+    rows = values.reshape(-1, places.size)
+    sums = [np.bincount(places.ravel(), row, minlength=size) for row in rows]
+    return np.stack(sums).reshape(shape)
+
+
+def cond(holds: Any, one: Callable[[], T], other: Callable[[], T]) -> T:
+    """What the first function gives where a truth holds, else the second; see `jax.lax.cond`."""
+    if numbers_of(holds) is jnp:
+        found: T = lax.cond(holds, one, other)
+        return found
+    return one() if holds else other()
+
+
 def scan(
     step: Callable[[Any, Any], tuple[Any, Any]], carry: Any, inputs: Any, *, reverse: bool = False
 ) -> tuple[Any, Any]:

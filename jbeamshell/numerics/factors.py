@@ -11,6 +11,7 @@ Murray, I. (2016). Differentiation of the Cholesky decomposition. arXiv 1602.075
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -61,5 +62,43 @@ def _inverse_cholesky_slope(matrix: tuple[Array], change: tuple[Array]) -> tuple
 
 def solve(matrix: Array, sides: Array) -> Array:
     """Solution x of A x = b for a symmetric positive definite matrix (n, n) and b (n, ...)."""
-    inverse = inverse_cholesky(matrix)
-    return inverse.T @ (inverse @ sides)
+    return solver(matrix)(sides)
+
+
+def solver(matrix: Array) -> Callable[[Array], Array]:
+    """Function of b (n, ...) that solves A x = b for a symmetric positive definite matrix (n, n).
+
+    It gives NaN where the matrix is not definite.
+    """
+    if numbers_of(matrix) is jnp:
+        inverse = inverse_cholesky(matrix)
+        return lambda sides: inverse.T @ (inverse @ sides)
+    lower, failed = lapack.dpotrf(matrix, lower=1)
+    if failed:
+        return lambda sides: np.full_like(sides, np.nan)  # type: ignore[return-value]
+    return lambda sides: lapack.dpotrs(lower, sides, lower=1)[0].reshape(sides.shape)
+
+
+def half_solved(matrix: Array, sides: Array) -> Array:
+    """Solution of L x = b (n, k), L the lower factor of a symmetric positive definite matrix.
+
+    NaN where the matrix is not definite.
+    """
+    if numbers_of(matrix, sides) is jnp:
+        return inverse_cholesky(matrix) @ sides
+    lower, failed = lapack.dpotrf(matrix, lower=1)
+    found: Array = np.nan * sides if failed else lapack.dtrtrs(lower, sides, lower=1)[0]
+    return found
+
+
+def inverse(matrix: Array) -> Array:
+    """Inverse of a symmetric positive definite matrix (n, n); NaN where it is not definite."""
+    if numbers_of(matrix) is jnp:
+        factor = inverse_cholesky(matrix)
+        return factor.T @ factor
+    lower, failed = lapack.dpotrf(matrix, lower=1)
+    if failed:
+        return np.full_like(matrix, np.nan)  # type: ignore[return-value]
+    half = np.tril(lapack.dpotri(lower, lower=1, overwrite_c=1)[0])
+    half += np.tril(half, -1).T
+    return half

@@ -72,7 +72,8 @@ def test_a_lane_that_needs_exact_rotations_leaves_the_others_alone():
     alone = [jb.solve(scene.replace({"strip.height_ratio": h}), throw=False) for h in heights]
     assert [run.scene.plan.kinematics for run in alone] == ["exact", "linear"]
     known = [float(run.dissipation) for run in alone]
-    np.testing.assert_allclose(found["dissipation"], known, rtol=1e-9)
+    # Plain calls find the matrices by NumPy, which rounds those of nine nodes otherwise.
+    np.testing.assert_allclose(found["dissipation"], known, rtol=1e-6)
 
 
 def test_pairs_are_the_product_lane_by_lane(result):
