@@ -13,6 +13,7 @@ from jbeamshell.common.numbers_of import numbers_of, put, summed
 from jbeamshell.numerics.factors import inverse
 
 SPARE = 1.5  # entries that are kept over those that are needed, before others are
+LARGE = 700  # rows, from which on memory is slower than the processor
 
 
 class Face(NamedTuple):
@@ -136,14 +137,21 @@ class Memory:
     def part(self, rows: Any, columns: Any) -> tuple[Any, Any, NDArray[np.float64]]:
         """Numbers of the rows and columns of a part, and the part, columns first.
 
+        Of large parts, which are multiplied alone, half of the digits are kept.
+
         Parameters
         ----------
         rows, columns : (N,) True for those that are needed; the part may have more
         """
-        wanted = np.count_nonzero(rows), np.count_nonzero(columns)
-        kept = np.count_nonzero(self._rows) * np.count_nonzero(self._columns)
-        fits = kept <= SPARE * wanted[0] * wanted[1]
-        if not (fits and not np.any(rows & ~self._rows) and not np.any(columns & ~self._columns)):
-            self._rows, self._columns = rows, columns
-            self._part = self._whole[np.ix_(columns, rows)]
-        return np.flatnonzero(self._rows), np.flatnonzero(self._columns), self._part
+        wanted = np.count_nonzero(rows) * np.count_nonzero(columns)
+        both = rows | self._rows, columns | self._columns
+        kept = np.count_nonzero(both[0]) * np.count_nonzero(both[1])
+        if kept > SPARE * wanted:
+            both = rows, columns
+        known = np.array_equal(both[0], self._rows) and np.array_equal(both[1], self._columns)
+        numbers = np.flatnonzero(both[0]), np.flatnonzero(both[1])
+        if not known:
+            self._rows, self._columns = both
+            part = self._whole[np.ix_(numbers[1], numbers[0])]
+            self._part = part.astype(np.float32) if numbers[0].size >= LARGE else part
+        return *numbers, self._part

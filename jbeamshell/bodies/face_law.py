@@ -62,12 +62,12 @@ def slip_at(move: Array, slip: Array, points: Points) -> Array:
     points : numbers of the points
     """
     xp = numbers_of(move)
-    trial, size, radius, slides = _friction(move, slip, points)
+    force = _normal_force(-(points.gap + move[..., 2]), points)
+    trial, size, radius, slides = _friction(move, slip, force, points)
     slid = move[..., :2] + trial * (radius / (points.springs[:, 0] * size))[..., None]
     tangential = xp.where(slides[..., None], slid, slip[..., :2])
-    v_n, smooth = move[..., 2], points.roughness[:, 0] == 0.0
-    normal = v_n + _normal_force(-(points.gap + v_n), points) / points.springs[:, 1]
-    closed = smooth & (points.gap + v_n <= 0.0)
+    normal = move[..., 2] + force / points.springs[:, 1]
+    closed = (points.roughness[:, 0] == 0.0) & (points.gap + move[..., 2] <= 0.0)
     normal = xp.where(closed, -points.gap, normal)  # to the last digit
     return xp.concatenate([tangential, normal[..., None]], axis=-1)
 
@@ -75,12 +75,11 @@ def slip_at(move: Array, slip: Array, points: Points) -> Array:
 def slip_slopes(move: Array, slip: Array, points: Points) -> Array:
     """Slopes (q, 3, 3) of `slip_at` by v, zero where a smooth point sticks."""
     xp = numbers_of(move)
-    trial, size, radius, slides = _friction(move, slip, points)
+    depth = -(points.gap + move[:, 2])
+    touches, force = depth >= 0.0, _normal_force(depth, points)
+    trial, size, radius, slides = _friction(move, slip, force, points)
     k_t, k_n = points.springs.T
     height, reference = points.roughness.T
-    depth = -(points.gap + move[:, 2])
-    touches = depth >= 0.0
-    force = _normal_force(depth, points)
     stiff = xp.where(touches, 1.0 / (1.0 / k_n + height / (reference + force)), 0.0)
     way = trial / size[:, None]
     across = np.eye(2) - way[:, :, None] * way[:, None, :]
@@ -93,12 +92,13 @@ def slip_slopes(move: Array, slip: Array, points: Points) -> Array:
     return xp.concatenate([top, bottom], axis=1)
 
 
-def _friction(move: Array, slip: Array, points: Points) -> tuple[Array, Array, Array, Array]:
+def _friction(
+    move: Array, slip: Array, normal: Array, points: Points
+) -> tuple[Array, Array, Array, Array]:
     """Force of the springs without slip, its size, its bound, and True where it is beyond."""
     xp = numbers_of(move)
     trial = points.springs[:, :1] * (slip[..., :2] - move[..., :2])
-    square = xp.sum(trial**2, axis=-1)
-    radius = points.friction * _normal_force(-(points.gap + move[..., 2]), points)
+    square, radius = xp.sum(trial**2, axis=-1), points.friction * normal
     slides = square > radius**2
     return trial, xp.sqrt(xp.where(slides, square, 1.0)), radius, slides
 

@@ -29,6 +29,7 @@ from jbeamshell.common.numbers_of import numbers_of
 PARTS = np.array([4, 8, 16]) / 16  # of the face, each of which has a program
 LEAST = 24  # displacements, below which a part is not worth its program
 MANY = 500  # displacements, from which on iterations take less time than factors
+FINEST = 1e-5  # error of iterations: the flexibility of large parts has half of the digits
 MOST = 150  # iterations, after which factors are taken
 
 Vector = NDArray[np.float64]
@@ -78,14 +79,14 @@ def _by_numpy(
     here, there = sticking.pulled[rows], away * sticking.pulled[columns]
 
     def apply(force: Vector) -> Vector:
-        moved = flexible @ force
+        moved = flexible @ force.astype(flexible.dtype)
         if away:
             moved -= there * (here @ force)
         return force - softer @ moved
 
     found = np.zeros(right.size)
     if rows.size >= MANY:
-        solved, close = _gmres(apply, right[rows], rough)
+        solved, close = _gmres(apply, right[rows], max(rough, FINEST))
         if close:
             found[rows] = solved
             return found

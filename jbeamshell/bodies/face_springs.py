@@ -20,6 +20,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy.sparse
 from jax import Array
 
 from jbeamshell.common.numbers_of import numbers_of, scan, summed
@@ -86,7 +87,8 @@ def sprung(
     h = summed(each, flat, size**2).reshape(size, size)
     h = xp.where(crossed, 0.0, h)
     if coarse is not None:
-        k, f, h = coarse.T @ k @ coarse, coarse.T @ f, coarse.T @ h @ coarse
+        few = scipy.sparse.csr_array(coarse)  # three nodes' displacements in each row
+        k, f, h = few.T @ (k @ few), few.T @ f, few.T @ (h @ few)
     alone = xp.diag(h) == 0.0
     h += xp.diag(alone * xp.max(h))
     longest = _shortest_wave(k, h)
