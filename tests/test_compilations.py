@@ -54,6 +54,23 @@ def test_a_plain_call_of_plane_elasticity_compiles_no_program(compiled):
     assert [name for name in compiled() if name.startswith("jit(_")] == []
 
 
+def test_a_plain_contact_of_bodies_on_a_face_compiles_no_program(compiled):
+    """In one process after another, the walk of it took eight seconds to compile."""
+    side = np.linspace(0.0, 1.0, 4)
+    places = np.array([(x, y, 0.0) for x in side for y in side])
+    random = np.random.default_rng(1)
+    root = random.normal(size=(48, 48))
+    forces = np.zeros((48, 2))
+    forces[0::3, 0], forces[2::3, 1] = 1.0 / 16, -1.0 / 16
+    body = jb.Substructure(places, root @ root.T / 48 + np.eye(48), forces)
+    jb.solve_contact(body, friction=0.3, amplitude=0.4, throw=False)
+    compiled()
+    history = jb.solve_contact(body, friction=0.1, amplitude=0.5, throw=False)
+    assert history.converged
+    assert float(history.dissipation) > 0.0
+    assert compiled() == []
+
+
 def test_sweeps_share_a_program_whatever_the_scene_s_other_numbers(compiled):
     over = {"load.amplitude": [0.4, 0.8]}
     scenes = [

@@ -7,8 +7,9 @@ contact act between nodes that match.
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
@@ -17,6 +18,7 @@ from jbeamshell.bodies import on_face, on_line
 from jbeamshell.bodies.contact_input import (
     Problem,
     all_loads,
+    as_number,
     check_bodies,
     check_smooth,
     checked_bolts,
@@ -29,10 +31,10 @@ from jbeamshell.bodies.contact_input import (
 from jbeamshell.bodies.contact_points import contact_points
 from jbeamshell.bodies.levels import Levels
 from jbeamshell.bodies.substructure import Substructure
-from jbeamshell.common.checks import as_leaf, is_traced, require, require_choice, require_number
+from jbeamshell.common.checks import is_traced, require, require_choice, require_number
 from jbeamshell.common.errors import Status, UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
-from jbeamshell.common.numbers_of import numbers_of
+from jbeamshell.common.numbers_of import numbers_of, plain
 from jbeamshell.common.progress import patience
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
@@ -118,6 +120,7 @@ def solve_contact(
         history = jb.solve_contact(upper, lower, friction=0.1, amplitude=0.5, bolts=[8e3, 8e3])
         history.dissipation, history.loop
     """
+    upper, lower = plain((upper, lower))
     check_bodies(upper, lower)
     face = upper.on_face
     solver = on_face if face else on_line
@@ -131,13 +134,13 @@ def solve_contact(
     if path is None:
         require_number("amplitude", amplitude)
         unit = unit_cycles(solver.MOST_CYCLES if cycles is None else cycles, steps, face)
-        path = as_leaf(amplitude) * jnp.asarray(unit)
+        path = as_number(amplitude, "amplitude") * unit
     else:
         fix = "is given beside path: leave one of them out"
         require("cycles", cycles, cycles is None, fix)
     made = contact_points(upper, lower, points) if face else None
     sizes = checked_bolts(upper, lower, bolts)
-    smooth = jnp.zeros(())
+    smooth: Any = np.zeros(())
     problem = Problem(
         upper=upper,
         lower=lower,
@@ -210,14 +213,15 @@ def _history(
     """History of levels, which holds NaN where they are not sound."""
     upper, face, sound = problem.upper, problem.face, levels.sound
     known = face is None or face.elements is None
-    areas = upper.tributary if known else jnp.asarray(face.areas)  # type: ignore[union-attr]
+    areas = upper.tributary if known else face.areas  # type: ignore[union-attr]
+    elements: Any = None if face is None else face.elements
     names = "loads", "displacements", "slip", "gap", "friction_force", "normal_force", "slip_work"
     values: dict[str, Array] = nan_unless(sound, {name: getattr(levels, name) for name in names})
     history = ContactHistory(
-        places=upper.places if face is None else jnp.asarray(face.places),
-        normals=upper.normals if face is None else jnp.asarray(face.normals),
+        places=upper.places if face is None else face.places,
+        normals=upper.normals if face is None else face.normals,
         tributary=areas,
-        elements=None if face is None or face.elements is None else jnp.asarray(face.elements),
+        elements=elements,
         **values,
         slipping=levels.slipping,
         status=numbers_of(sound).where(sound, int(Status.CONVERGED), int(Status.MAX_ITERATIONS)),

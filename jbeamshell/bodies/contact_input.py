@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
@@ -18,6 +17,7 @@ from jbeamshell.common.checks import (
     require_count,
     require_finite,
 )
+from jbeamshell.common.numbers_of import numbers_of
 from jbeamshell.scene.parts import unit_path
 
 LEAST_STEPS = 8  # per half cycle on a face
@@ -99,6 +99,12 @@ def held_nodes(upper: Substructure, lower: Substructure | None) -> tuple[bool, .
     return tuple(fixed[:, 0].tolist())
 
 
+def as_number(value: ArrayLike, key: str) -> Any:
+    """Floating-point array of NumPy, or of JAX if it is traced; see `as_leaf`."""
+    leaf = as_leaf(value, key)
+    return leaf if is_traced(leaf) else np.asarray(leaf)
+
+
 def checked_bolts(upper: Substructure, lower: Substructure | None, bolts: ArrayLike) -> Array:
     """Size of each pressing load, (m - 1,)."""
     count = upper.bolts if lower is None else max(upper.bolts, lower.bolts)
@@ -107,54 +113,59 @@ def checked_bolts(upper: Substructure, lower: Substructure | None, bolts: ArrayL
         if body is not None:
             fix = f"give {count} in both bodies, or none in one of them"
             require(key, body.bolts, body.bolts in (0, count), fix)
-    sizes = as_leaf(bolts, "bolts")
+    sizes = as_number(bolts, "bolts")
     fix = f"give a number, or one for each of {count} presses"
     require("bolts", bolts, sizes.shape in ((), (count,)), fix)
     _require_not_negative("bolts", bolts, sizes, PRESS)
-    return jnp.broadcast_to(sizes, (count,))
+    found: Array = numbers_of(sizes).broadcast_to(sizes, (count,))
+    return found
 
 
 def checked_gap(upper: Substructure, face: ContactPoints | None, gap: ArrayLike) -> Array:
     """Gap (n,) of the nodes of a line, or (q,) of the contact points of a face."""
     n = upper.places.shape[0]
-    distance = as_leaf(gap, "gap")
+    distance = as_number(gap, "gap")
     fix = f"give a number, or one for each of {n} nodes"
     require("gap", gap, distance.shape in ((), (n,)), fix)
     _require_not_negative("gap", gap, distance, "bodies cannot overlap before anything presses")
-    distance = jnp.broadcast_to(distance, (n,))
-    return distance if face is None else face.upper.of(distance)
+    distance = numbers_of(distance).broadcast_to(distance, (n,))
+    found: Array = distance if face is None else face.upper.of(distance)
+    return found
 
 
 def checked_friction(upper: Substructure, face: ContactPoints | None, friction: ArrayLike) -> Array:
     """Coulomb's coefficient, () or, on a face, (q,)."""
-    value, n = as_leaf(friction, "friction"), upper.places.shape[0]
+    value, n = as_number(friction, "friction"), upper.places.shape[0]
     shapes = ((), (n,)) if upper.on_face else ((),)
     fix = f"give a number, or one for each of {n} nodes" if upper.on_face else "give one number"
     require("friction", friction, value.shape in shapes, fix)
     _require_not_negative("friction", friction, value)
-    return face.upper.of(value) if face is not None and value.ndim else value
+    found: Array = face.upper.of(value) if face is not None and value.ndim else value
+    return found
 
 
 def checked_softness(face: ContactPoints, softness: ArrayLike) -> Array:
     """Displacement per force (q, 2) of a face's surfaces at each point, tangential and normal."""
-    soft = as_leaf(softness, "softness")
+    soft = as_number(softness, "softness")
     fix = "give a number, or a tangential and a normal one"
     require("softness", softness, soft.shape in ((), (2,)), fix)
     _require_not_negative("softness", softness, soft)
-    return jnp.broadcast_to(soft, (2,)) / jnp.asarray(face.areas)[:, None]
+    found: Array = numbers_of(soft).broadcast_to(soft, (2,)) / face.areas[:, None]
+    return found
 
 
 def checked_roughness(face: ContactPoints, roughness: ArrayLike) -> Array:
     """Height h and force F_0 (q, 2) of a face's surfaces at each point."""
-    rough = as_leaf(roughness, "roughness")
+    rough = as_number(roughness, "roughness")
     if rough.ndim == 0 and not is_traced(rough) and float(rough) == 0.0:
-        rough = jnp.array([0.0, 1.0])
+        rough = np.array([0.0, 1.0])
     require("roughness", roughness, rough.shape == (2,), "give 0, or a height and a pressure")
     _require_not_negative("roughness", roughness, rough)
     fix = "needs a pressure above 0: that at which surfaces are twice as stiff as at first touch"
     require("roughness", roughness, is_traced(rough) or bool(rough[1] > 0.0), fix)
-    areas = jnp.asarray(face.areas)[:, None]
-    return jnp.broadcast_to(rough, (areas.size, 2)) * jnp.concatenate([areas**0, areas], axis=1)
+    areas = face.areas[:, None]
+    found: Array = rough * np.concatenate([areas**0, areas], axis=1)
+    return found
 
 
 def check_smooth(softness: ArrayLike, roughness: ArrayLike) -> None:
@@ -182,16 +193,19 @@ def all_loads(targets: ArrayLike, sizes: Array, on_face: bool) -> Array:
     sizes : (m - 1,) of the pressing loads
     on_face : True for bodies on a face, whose pressing may change
     """
-    pressing, path = jnp.append(0.0, sizes), as_leaf(targets, "path")
+    path = as_number(targets, "path")
+    xp = numbers_of(path, sizes)
+    pressing = xp.append(0.0, sizes)
     require_finite("path", path)
     fix = "give (levels,) loads to and fro"
     fix += f", or (levels, {pressing.size}) of all loads" if on_face else ""
     shaped = path.ndim in ((1, 2) if on_face else (1,)) and path.size > 0
     require("path", path.shape, shaped, fix)
     if path.ndim == 1:
-        path = path[:, None] * jnp.eye(1, pressing.size) + pressing
+        path = path[:, None] * np.eye(1, pressing.size) + pressing
     require("path", path.shape, path.shape[1] == pressing.size, fix)
-    return jnp.concatenate([pressing[None], path])
+    found: Array = xp.concatenate([pressing[None], path])
+    return found
 
 
 def _require_not_negative(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import functools
 
-import equinox as eqx
-import jax
 import numpy as np
 
 from jbeamshell.bodies.coarser_mesh import coarser
@@ -17,7 +15,7 @@ from jbeamshell.bodies.face_program import traced_levels
 from jbeamshell.bodies.face_step import TOLERANCE
 from jbeamshell.bodies.levels import Found, Levels
 from jbeamshell.common.checks import is_traced
-from jbeamshell.common.numbers_of import numbers_of, without_slopes
+from jbeamshell.common.numbers_of import numbers_of, plain, without_slopes
 from jbeamshell.common.small import Small, always
 from jbeamshell.common.threads import on_one_core
 
@@ -42,7 +40,7 @@ def solved(problem: Problem) -> Found:
         inputs = bodies.face, problem.loads
         steps, count = traced_levels(inputs, problem.half, frictional, driven)
         return Found(_in_levels((bodies, steps)), count)
-    return _by_numpy(jax.tree.map(lambda a: np.asarray(a) if eqx.is_array(a) else a, problem))
+    return _by_numpy(plain(problem))
 
 
 @on_one_core

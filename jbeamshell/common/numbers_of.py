@@ -15,6 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from jbeamshell.common.checks import is_traced
+
 P = ParamSpec("P")
 R = TypeVar("R")
 T = TypeVar("T")
@@ -25,6 +27,14 @@ def numbers_of(*values: object) -> Any:
     if all(isinstance(value, np.ndarray | np.generic) for value in values):  # soon known
         return np
     return jnp if any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(values)) else np
+
+
+def plain(tree: T) -> T:
+    """Pytree with arrays of NumPy in place of JAX's; as it is if one of them is traced."""
+    if is_traced(tree):
+        return tree
+    found: T = jax.tree.map(lambda a: np.asarray(a) if isinstance(a, jax.Array) else a, tree)
+    return found
 
 
 def put(array: Any, place: Any, values: Any) -> Any:
