@@ -137,11 +137,14 @@ def two_blocks(
     lower: Sequence[int] | None = None,
     quadratic: bool = False,
     sizes: Sequence[float] = SIZES,
+    way: int = 1,
+    patch: float = np.inf,
 ) -> tuple[jb.Substructure, jb.Substructure]:
     """Block on another one that is held below, pressed by 1 over its top and pulled at its end.
 
     ``upper`` and ``lower`` are bricks along, across and through each; the lower ones are the upper
-    ones if left out.
+    ones if left out.  The pull is along X (1) or Y (2).  A patch, its radius over the sizes, is
+    pressed by a paraboloid, instead of all of the top evenly.
     """
     lower = upper if lower is None else lower
     height = sizes[2]
@@ -151,11 +154,13 @@ def two_blocks(
     end, ends = side(places, 0, sizes[0], **on)
     face, elements = side(places, 2, 0.0, **on)
     press, pull = (jb.face_surface(*a).areas for a in ((top, tops), (end, ends)))
+    away = (top[:, 1:3] / sizes[:2] - 0.5) / patch
+    press = press * np.maximum(1.0 - np.sum(away**2, axis=1), 0.0)
     above = model.condensed(
         face,
         elements=elements,
         press=[np.column_stack([top[:, 0], np.full(len(top), 3), -press / np.sum(press)])],
-        pull=np.column_stack([end[:, 0], np.full(len(end), 1), pull / np.sum(pull)]),
+        pull=np.column_stack([end[:, 0], np.full(len(end), way), pull / np.sum(pull)]),
     )
     model, places = box(
         lower,
