@@ -64,8 +64,9 @@ def _by_numpy(
     groups = np.flatnonzero(slopes.reshape(len(face.shares), -1).any(axis=1))
     shares: Any = face.shares[groups]
     places: Any = face.places[groups]
-    slopes = slopes.reshape(len(face.shares), -1, 3, 3)[groups]
-    parts = shares.reshape(*slopes.shape[:3], -1)
+    count = shares.shape[1] // 3
+    slopes = slopes.reshape(-1, count, 3, 3)[groups]
+    parts = shares.reshape(-1, count, 3, shares.shape[2])
     blocks = shares.swapaxes(1, 2) @ (slopes @ parts).reshape(shares.shape)
     changed = right != 0.0
     changed[places[blocks.any(axis=2)]] = True
@@ -92,7 +93,7 @@ def _by_numpy(
             return found
     matrix = softer @ (flexible - np.outer(there, here) if away else flexible)
     np.negative(matrix, out=matrix)
-    matrix.ravel()[:: rows.size + 1] += 1.0
+    np.fill_diagonal(matrix, np.diagonal(matrix) + 1.0)
     factors, pivots, failed = lapack.dgetrf(matrix.T, overwrite_a=1)
     found[rows] = np.nan if failed else lapack.dgetrs(factors, pivots, right[rows], trans=1)[0]
     return found

@@ -266,29 +266,37 @@ class TestRefusals:
                 jb.Substructure(**arrays)
 
 
-def test_sweeps_lead_on_where_newtons_method_goes_in_circles():
-    # Six pairs that are strongly coupled, normals all round, and mu near 1.
-    draw = np.random.default_rng(35)
-    places = np.column_stack([np.arange(6) % 3, np.arange(6) // 3, np.zeros(6)]) * 1.0
-    root = draw.normal(size=(18, 18))
-    normals = draw.normal(size=(6, 3))
+def coupled(seed, n):
+    """History of pairs that are strongly coupled, normals all round, and mu near 1; and mu."""
+    draw = np.random.default_rng(seed)
+    places = np.column_stack([np.arange(n) % 3, np.arange(n) // 3, np.zeros(n)]) * 1.0
+    root = draw.normal(size=(3 * n, 3 * n))
+    normals = draw.normal(size=(n, 3))
     normals[:, 2] = np.abs(normals[:, 2])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    loads = np.zeros((18, 2))
-    loads[:, 0] = draw.normal(size=18)
-    loads[2::3, 1] = -draw.uniform(0.5, 2.0, 6)
-    stiffness = root @ root.T / 18.0 + 0.02 * np.eye(18)
+    loads = np.zeros((3 * n, 2))
+    loads[:, 0] = draw.normal(size=3 * n)
+    loads[2::3, 1] = -draw.uniform(0.5, 2.0, n)
+    stiffness = root @ root.T / (3.0 * n) + 0.02 * np.eye(3 * n)
     body = jb.Substructure(places, stiffness, loads, normals=normals)
     mu, amplitude = draw.uniform(0.5, 1.0), draw.uniform(0.2, 3.0)
     steps = {"cycles": 1, "steps_per_half_cycle": 8}
-    found = jb.solve_contact(body, friction=mu, amplitude=amplitude, throw=False, **steps)
-    assert np.max(found.iterations) > ROUND
-    assert np.all(np.asarray(found.status) == 0)
-    normal = np.asarray(found.normal_force)
-    assert np.min(found.gap) > -1e-10
-    assert np.min(normal) >= 0.0
-    rubbed = np.linalg.norm(found.friction_force, axis=-1)
-    assert np.all(rubbed <= mu * normal + 1e-9 * np.max(normal))
+    return jb.solve_contact(body, friction=mu, amplitude=amplitude, throw=False, **steps), mu
+
+
+@pytest.mark.filterwarnings("ignore::jbeamshell.DoubtfulWarning")
+def test_strongly_coupled_pairs_have_an_equilibrium():
+    longest = 0
+    for seed, n in (*zip(range(16), (6, 9) * 8, strict=True), (35, 6)):
+        found, mu = coupled(seed, n)
+        assert np.all(np.asarray(found.status) == 0)
+        normal = np.asarray(found.normal_force)
+        assert np.min(found.gap) > -1e-10
+        assert np.min(normal) >= 0.0
+        rubbed = np.linalg.norm(found.friction_force, axis=-1)
+        assert np.all(rubbed <= mu * normal + 1e-9 * np.max(normal))
+        longest = max(longest, np.max(found.iterations))
+    assert longest > ROUND  # sweeps led on where Newton's method went in circles
 
 
 DAMAGED = ("places", "normals", "tributary", "stiffness", "forces", "flexibility")

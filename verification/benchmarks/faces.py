@@ -1,8 +1,8 @@
 """Time of a loop of a contact on a face, over its pairs, beside CalculiX; seconds of the processor.
 
 A block on a rigid base is pressed unevenly, pulled and turned, a cycle in 40 load steps for each
-half, with the softness that CalculiX is given.  The time has the run of half the load steps, by
-which the error is estimated.
+half, with the softness that CalculiX is given.  The time has the runs of half the load steps and of
+a coarser mesh, by which the errors are estimated.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def draw(record: dict[str, Any]) -> Figure:
         figure, axes = plt.subplots(figsize=(5.2, 3.8))
         for key, colour, words in (
             ("seconds", PALETTE[0], "warm call"),
-            ("first_s", PALETTE[1], "first call, with compiling"),
+            ("first_s", PALETTE[1], "first call"),
         ):
             values = [r[key] for r in rows]
             axes.plot([r["pairs"] for r in rows], values, "o-", color=colour, label=words)
