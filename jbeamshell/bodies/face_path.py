@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.bodies.face import Drive, Face, Sticking
-from jbeamshell.bodies.face_step import TOLERANCE, Found, forces, take_step
+from jbeamshell.bodies.face_step import BALANCED, Found, forces, take_step
 from jbeamshell.common.checks import TINY
 from jbeamshell.common.numbers_of import numbers_of, quiet, scan, without_slopes
 
@@ -99,7 +99,7 @@ def ends(before: Steps, now: Steps) -> Array:
     slip = without_slopes(now.slip[..., :2])
     apart = xp.max(xp.abs(slip[-1] - without_slopes(before.slip[..., :2])))
     steady = apart <= REPEATS * xp.max(xp.ptp(slip, axis=0))
-    found: Array = steady | ~(now.error[-1] <= TOLERANCE)
+    found: Array = steady | ~(now.error[-1] <= BALANCED)
     return found
 
 
@@ -137,7 +137,7 @@ def steps_of(
         guess = xp.where(xp.all(before.given == 0.0), closed, guess)
         points = face.points._replace(friction=now.rub * face.points.friction)
         own, drive = face._replace(points=points), Drive(now.loads, now.driven, start)
-        if xp is np and not before.error <= TOLERANCE:  # no level after it counts
+        if xp is np and not before.error <= BALANCED:  # no level after it counts
             found = Found(before.u, before.error, xp.zeros(()))
         else:
             found = take_step(own, sticking, before.slip, drive, guess)

@@ -41,9 +41,8 @@ def traced_levels(
     if half is None:
         last, path = first_steps(loads, frictional, driven)
         begun, _ = steps_of(bodies, begin, start, path)
-        return _joined(pressed(begun, last), jax.tree.map(lambda a: a[last:], begun)), jnp.asarray(
-            0
-        )
+        others = jax.tree.map(lambda a: a[last:], begun)
+        return _joined(pressed(begun, last), others), jnp.asarray(0)
     rise, length = 1 + half // 2, 2 * half
     # Each loop compiles for seconds: that of the pressing and the rise takes the cycles too.
     rests = jnp.broadcast_to(loads[rise - 1], (length, loads.shape[1]))

@@ -28,13 +28,13 @@ from jbeamshell.bodies.face_part import part_of_step
 from jbeamshell.common.numbers_of import cond, numbers_of, while_loop
 
 TOLERANCE = 1e-11  # force out of balance over the largest load of a node
+BALANCED = 1e-9  # the same at the end of a step: a body that walks is in balance to fewer digits
 ITERATIONS = 80
 ROUND = 20  # iterations after which Newton's method starts anew, from where sweeps have led
 SWEEPS = 400  # between two such rounds
 ROUGHLY = 1e-2  # error of a Newton step over the residual, which is less near the solution
 ENOUGH = 0.3  # of `TOLERANCE`, below which no Newton step need go
 SHORTER = 0.5 ** np.arange(1.0, 7.0)  # lengths that are tried where a whole Newton step fails
-REFINED = 3  # times at most that rounding is taken out of the displacements of a step
 
 
 class Found(NamedTuple):
@@ -111,12 +111,8 @@ def _newton(
 ) -> tuple[Array, Array, Array]:
     """Displacements where the residual vanishes, its size, and the iterations."""
     xp = numbers_of(guess)
-    points, driven, pull, springs = (
-        face.points,
-        drive.driven,
-        face.loads[:, 0],
-        face.points.stiffness,
-    )
+    points, springs = face.points, face.points.stiffness
+    driven, pull = drive.driven, face.loads[:, 0]
 
     def by_law(moves: Array) -> Array:
         return face.on_nodes(springs * slip_at(moves, slip, points))
@@ -170,18 +166,15 @@ def _newton(
     begin = at(u, held, face.moves(u), xp.asarray(0))
     state = while_loop(goes_on, improve, begin)
 
-    def residual(u: Array) -> tuple[Array, Array, Array]:
+    def balanced(u: Array) -> tuple[Array, Array, Array]:
         off = _off_balance(face, u, slip, drive)
         return u, off, relative(u, off)
 
-    def refined(now: tuple[Any, Array]) -> tuple[Any, Array]:
-        (u, off, _), left = now
-        return residual(u - sticking.moved(off, driven, pull)), left - 1
-
+    u, off, error = balanced(state.u)
     # What is left is rounding, if the bodies are much stiffer in one way than in another.
-    (u, _, error), _ = while_loop(
-        lambda now: (now[0][2] > TOLERANCE) & (now[1] > 0),
-        refined,
-        (residual(state.u), xp.asarray(REFINED)),
+    u, _, error = cond(
+        error > TOLERANCE,
+        lambda: balanced(u - sticking.moved(off, driven, pull)),
+        lambda: (u, off, error),
     )
     return u, error, xp.asarray(state.taken, float)

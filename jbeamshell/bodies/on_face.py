@@ -12,7 +12,7 @@ from jbeamshell.bodies.face import Sticking
 from jbeamshell.bodies.face_bodies import Bodies, bodies_of
 from jbeamshell.bodies.face_path import MOST_CYCLES, Steps, levels_of
 from jbeamshell.bodies.face_program import traced_levels
-from jbeamshell.bodies.face_step import TOLERANCE
+from jbeamshell.bodies.face_step import BALANCED
 from jbeamshell.bodies.levels import Found, Levels
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.numbers_of import numbers_of, plain, without_slopes
@@ -82,7 +82,7 @@ def _in_levels(inputs: tuple[Bodies, Steps]) -> Levels:
     at_limit = xp.linalg.norm(pull, axis=-1) >= (1.0 - SLIDES) * points.friction * normal
     mean = 0.5 * (pull[1:] + pull[:-1])
     work = xp.sum(mean * xp.diff(slip, axis=0), axis=(1, 2))
-    sound = without_slopes(steps.error) <= TOLERANCE
+    sound = without_slopes(steps.error) <= BALANCED
     return Levels(
         loads=steps.load,
         displacements=moved,
