@@ -76,12 +76,12 @@ def coarser(problem: Problem) -> tuple[Coarser, ...] | None:
         order = in_order(lower, face)
         held = [held[0] | held[1][order]] * 2
         bodies = [upper, upper]
-    found = [_of_body(body, stays) for body, stays in zip(bodies, held, strict=True)]
+    found = [coarser_of_body(body, stays) for body, stays in zip(bodies, held, strict=True)]
     kept = tuple(mesh for mesh in found if mesh is not None)
     return None if len(kept) < len(found) else kept
 
 
-def _of_body(body: Substructure, held: NDArray[np.bool_]) -> Coarser | None:
+def coarser_of_body(body: Substructure, held: NDArray[np.bool_]) -> Coarser | None:
     """Coarser mesh of a body whose held nodes (n,) stay."""
     places, normals = np.asarray(body.places), np.asarray(body.normals)
     mean = np.mean(normals, axis=0)

@@ -34,6 +34,7 @@ ROUND = 20  # iterations after which Newton's method starts anew, from where swe
 SWEEPS = 400  # between two such rounds
 ROUGHLY = 1e-2  # error of a Newton step over the residual, which is less near the solution
 ENOUGH = 0.3  # of `TOLERANCE`, below which no Newton step need go
+TURNS = 2  # of Newton's method, the second one with the bodies in balance again
 SHORTER = 0.5 ** np.arange(1.0, 7.0)  # lengths that are tried where a whole Newton step fails
 
 
@@ -161,20 +162,24 @@ def _newton(
         lasts = (state.error > TOLERANCE) & xp.isfinite(state.error)
         return lasts & (state.taken < ITERATIONS)
 
+    def again(state: _State, off: Array) -> _State:
+        u = state.u - sticking.moved(off, driven, pull)
+        return at(u, state.held, face.moves(u), state.taken)
+
+    def settled(now: tuple[_State, Array, Array, Array]) -> tuple[_State, Array, Array, Array]:
+        state, off, _, left = now
+        state = cond(left == TURNS, lambda: state, lambda: again(state, off))
+        state = while_loop(goes_on, improve, state)
+        off = _off_balance(face, state.u, slip, drive)
+        return state, off + state.off, relative(state.u, off), left - 1
+
     held = face.on_nodes(springs * guess)
     u = sticking.under(face, held, drive)
     begin = at(u, held, face.moves(u), xp.asarray(0))
-    state = while_loop(goes_on, improve, begin)
-
-    def balanced(u: Array) -> tuple[Array, Array, Array]:
-        off = _off_balance(face, u, slip, drive)
-        return u, off, relative(u, off)
-
-    u, off, error = balanced(state.u)
-    # What is left is rounding, if the bodies are much stiffer in one way than in another.
-    u, _, error = cond(
-        error > TOLERANCE,
-        lambda: balanced(u - sticking.moved(off, driven, pull)),
-        lambda: (u, off, error),
+    # The flexibility is rounded: what that leaves out of balance is taken out of u, once.
+    state, _, error, _ = while_loop(
+        lambda now: (now[2] > TOLERANCE) & (now[3] > 0),
+        settled,
+        (begin, xp.zeros_like(u), xp.asarray(np.inf), xp.asarray(TURNS)),
     )
-    return u, error, xp.asarray(state.taken, float)
+    return state.u, error, xp.asarray(state.taken, float)

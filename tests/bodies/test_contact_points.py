@@ -10,6 +10,7 @@ import pytest
 
 import jbeamshell as jb
 from calibration.finite_elements.boxes import box, side, two_blocks
+from jbeamshell.bodies.coarser_mesh import coarser_of_body
 from jbeamshell.bodies.contact_points import contact_points
 
 COARSE, OTHER = (4, 2, 1), (5, 3, 1)
@@ -87,6 +88,24 @@ class TestPressure:
         np.testing.assert_allclose(history.gap, 0.0, atol=1e-4 * 7.0 / 210e3)
 
 
+class TestCoarser:
+    @pytest.mark.parametrize("shape", [(6, 3, 2), (5, 4, 1)])
+    def test_displacements_that_are_linear_are_those_of_the_nodes_that_stay(self, shape):
+        upper, _ = blocks(shape)
+        mesh = coarser_of_body(upper, np.zeros(len(upper.places), bool))
+        slopes = np.random.default_rng(1).normal(size=(3, 3))
+        moved = (np.asarray(upper.places) @ slopes).reshape(-1, 3)
+        found = mesh.moves @ moved[mesh.kept].ravel()
+        np.testing.assert_allclose(found, moved.ravel(), atol=1e-9 * np.max(np.abs(moved)))
+        assert len(mesh.kept) <= 0.6 * len(moved)
+
+    def test_nodes_that_supports_hold_stay(self):
+        upper, _ = blocks((6, 3, 2))
+        held = np.random.default_rng(2).random(len(upper.places)) < 0.3
+        kept = coarser_of_body(upper, held).kept
+        assert set(np.flatnonzero(held)) <= set(kept.tolist())
+
+
 class TestMeshes:
     def test_meshes_that_do_not_match_find_what_those_do_that_match(self):
         one, other = loop(), loop(COARSE, OTHER)
@@ -131,6 +150,15 @@ class TestLoads:
         forces = np.asarray(history.force)
         assert forces[start] == pytest.approx(3000.0, rel=1e-3)  # all of it slides
         assert forces[turn] == pytest.approx(-3000.0, rel=1e-3)
+
+    def test_cycles_go_on_until_the_slip_of_one_ends_where_it_began(self):
+        history = jb.solve_contact(*blocks(), **LOAD, steps_per_half_cycle=8, throw=False)
+        slip, left = history.slip, []
+        for begin, _, end in history.cycles:
+            apart = np.max(np.abs(slip[end] - slip[begin]))
+            left.append(apart / np.max(np.ptp(slip[begin : end + 1], axis=0)))
+        assert len(left) == 3
+        assert left[-1] < 3e-3 < left[-2]
 
     def test_a_traced_call_takes_the_cycles_of_a_plain_one(self):
         made = blocks()

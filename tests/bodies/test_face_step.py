@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from jbeamshell.bodies import face_part, substructure
-from jbeamshell.bodies.face import Face, Sticking
+from jbeamshell.bodies.face import Drive, Face, Sticking
 from jbeamshell.bodies.face_law import Points, slip_at, slip_slopes
 from jbeamshell.bodies.face_part import part_of_step
+from jbeamshell.bodies.face_step import take_step
 
 POINTS, NODES = 40, 30
 
@@ -124,3 +125,14 @@ def test_many_or_unclear_loose_motions_take_all_eigenvectors():
     assert substructure._few_loose(np.diag(values), 1e-9) is None
     values = np.append(np.full(3, 1.5e-9), np.geomspace(1e-5, 1.0, 57))
     assert substructure._few_loose(np.diag(values), 1e-9) is None
+
+
+def test_a_step_takes_out_what_rounding_has_left_in_the_flexibility():
+    face = face_of(np.random.default_rng(8))
+    sticking = Sticking.of(face)
+    rounded = sticking._replace(inverse=sticking.inverse * (1.0 + 1e-7))
+    drive = Drive(np.array([0.3, 1.0]), np.asarray(False), np.zeros(()))
+    none = np.zeros((POINTS, 3))
+    found, known = (take_step(face, each, none, drive, none) for each in (rounded, sticking))
+    assert found.error < 1e-12
+    np.testing.assert_allclose(found.u, known.u, atol=1e-12 * np.max(np.abs(known.u)))

@@ -15,6 +15,7 @@ from calibration.running import read
 from calibration.strip import changed
 from calibration.studies import brake_reuss, four_parameters
 from calibration.studies import laws_of_a_strip as laws
+from jbeamshell.history import contact_history
 from verification import (
     campaign,
     face_meshes,
@@ -239,13 +240,20 @@ def test_a_row_of_the_slopes():
 
 
 def test_stated_errors_of_a_mesh_mostly_hold_and_are_of_the_size_of_true_ones():
-    record = record_of(face_meshes)
+    record, every = record_of(face_meshes), []
     for problem in face_meshes.PARTS:
         rows, found = record[problem]["rows"], record[problem]["summary"]
         assert found == pytest.approx(face_meshes.summary(rows))
-        # 90 % would take larger factors, which are three to four times too large already.
-        assert found["held"] >= 0.8 * len(rows)
-        assert found["median"] < 5.0
+        # Loops of cubes converge slowly: they are told a third of their error, and are doubted.
+        assert found["held"] >= (0.2 if problem == "cubes" else 0.84) * len(rows)
+        assert found["median"] < 6.0
+        every += rows
+    found = face_meshes.summary(every)
+    assert found["held"] >= 0.8 * len(every)
+    assert found["median"] < 3.0
+    undoubted = [row["error"] for row in every if row["stated"] < contact_history.COARSE]
+    assert len(undoubted) > 0.5 * len(every)
+    assert max(undoubted) < 0.07
     punch = [row for row in record["punch"]["rows"] if row["quadratic"] and row["elements"] == 12]
     assert [row["error"] < 0.02 for row in punch] == [False, True, True]  # one element slips at .3
 
