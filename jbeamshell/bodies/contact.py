@@ -174,7 +174,7 @@ def solve_contact(
         history = history.compared_with(of_levels(coarse), mesh, _kind(problem))
     if throw and not is_traced(history):
         _demand(problem, levels)
-        warn_of_doubts(history.doubts, stacklevel=2)
+        warn_of_doubts(history.doubts)
     return history
 
 

@@ -281,7 +281,7 @@ def face_curve(
         doubts=tuple(words[0] + more.get(fix, "") for fix, words in said.items()),
     )
     if throw:
-        warn_of_doubts(curve.doubts, stacklevel=2)
+        warn_of_doubts(curve.doubts)
     return curve
 
 

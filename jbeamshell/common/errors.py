@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
+import sys
 import warnings
 from collections.abc import Iterable
+from pathlib import Path
 
 LONGEST = 800  # characters of a message
+INSIDE = str(Path(__file__).parents[1]), contextlib.__file__  # files between a user and a warning
 
 
 class InputError(ValueError):
@@ -30,10 +34,13 @@ class DoubtfulWarning(UserWarning):
     """Result that converged and may still be wrong; see `jbeamshell.History.doubts`."""
 
 
-def warn_of_doubts(doubts: Iterable[str], stacklevel: int = 2) -> None:
-    """Warn of everything doubtful about a result, by default where the caller was called."""
+def warn_of_doubts(doubts: Iterable[str]) -> None:
+    """Warn of everything doubtful about a result, where the user called the library."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(INSIDE):
+        level, frame = level + 1, frame.f_back
     for doubt in doubts:
-        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=stacklevel + 1)
+        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=level)
 
 
 class Status(enum.IntEnum):

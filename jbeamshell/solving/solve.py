@@ -12,7 +12,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -22,7 +21,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
-from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
+from jbeamshell.common.errors import Status, UnconvergedError, warn_of_doubts
 from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.progress import patience
 from jbeamshell.common.small import Small
@@ -53,7 +52,6 @@ SINGLE = (
     "single precision in a JAX transformation: the dissipation may be off by several per cent; "
     "write jax.config.update('jax_enable_x64', True) before anything is computed"
 )
-STACK = 4  # frames from a warning to the caller of `solve`
 
 
 def solve(
@@ -145,7 +143,7 @@ def run(
     touching = None if contact is None else check_contact(scene, contact)
     history = _marched(scene, whole, touching, solver or Newton(), throw).but(cycles=cycles)
     if throw and not is_traced(history):
-        warn_of_doubts(history.doubts, stacklevel=STACK)
+        warn_of_doubts(history.doubts)
     return history
 
 
@@ -174,7 +172,7 @@ def _walked(
     """History on the contact line, on a grid that keeps the tolerance."""
     traced, by_force = is_traced(scene, path) or is_staged(), scene.load.control == "force"
     if traced and not _precise(scene):
-        warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
+        warn_of_doubts([SINGLE])
 
     def walked(scene: Scene, strip: Strip | None = None) -> History:
         return walk(scene, path, cycles, own=own, strip=strip).of_scene(scene)
@@ -190,7 +188,7 @@ def _walked(
         load = float(path.target[step]) * float(scene.wide if by_force else 1.0)
         raise UnconvergedError(f"load step {step} (load {load:.6g}) has {NO_END}")
     if throw:
-        warn_of_doubts(history.doubts, stacklevel=STACK + 1)
+        warn_of_doubts(history.doubts)
     return history
 
 

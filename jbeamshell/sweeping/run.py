@@ -136,7 +136,7 @@ def sweep(
         if store is not None and table is not None:
             publish(result, store.folder, table)
             store.remove()
-    warn_of_doubts(filter(None, [result.attrs["doubts"]]), stacklevel=3)
+    warn_of_doubts(filter(None, [result.attrs["doubts"]]))
     return result
 
 
