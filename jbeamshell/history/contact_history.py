@@ -33,8 +33,8 @@ OF_FACE = ("step_error", "mesh_error", "stuck_stiffness", "gross_slip")
 OUT_OF_BALANCE = 1e-4  # force over the largest reaction, from which on a result is doubted
 NO_SLIP = {1: 1e-12, 2: 1e-9}  # work over that of the loop's width, taken as zero
 TOUCHES = 1e-9  # of the largest reaction, below which a reaction is that of an open pair, rounded
-# Error of the dissipation by the mesh, over `MeshChange.loss`: nine of ten loops of
-# verification/face_meshes.py are within it.
+# Error of the dissipation by the mesh, over `MeshChange.loss`: of verification/face_meshes.py nine
+# of ten loops are within it, but for cubes, whose loss converges slowly.
 MESH = {"linear": 1.75, "cut": 1.65, "quadratic": 0.67}
 COARSE = 0.1  # error by the mesh, from which on a result is doubted
 SHARES = 0.8  # of the error by the mesh, that the elements bear which are named
