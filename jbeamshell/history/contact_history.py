@@ -419,9 +419,9 @@ class ContactHistory(LoopFigures, eqx.Module):
         """Doubt about a mesh with such an error, or with one that is not known."""
         if np.isnan(error):
             return (
-                "the mesh has an error that is not known, because it has too few nodes to compare "
-                "it with a coarser one: mesh the bodies finer, or take points=True for nodes that "
-                "are contacts of their own"
+                "the mesh has an error that is not known, because it has too few nodes for a "
+                "coarser one, or that has no equilibrium: mesh the bodies finer, or take "
+                "points=True for nodes that are contacts of their own"
             )
         by = f"{100.0 * error:.2g} %" if error < 1.0 else "100 % or more"
         said, fix = f"the mesh may put the dissipation off by {by}", "mesh face and bodies finer"
