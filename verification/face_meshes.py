@@ -125,7 +125,7 @@ PARTS = {name: _part(problem) for name, problem in PROBLEMS.items()}
 
 
 def tell(record: Record) -> str:
-    """How many stated errors hold, of each problem and of all."""
+    """Number of stated errors that hold, of each problem and of all."""
     rows = [row for name in PARTS if name in record for row in record[name]["rows"]]
     found = {name: record[name]["summary"] for name in PARTS if name in record}
     return as_text(found | {"all": summary(rows)})

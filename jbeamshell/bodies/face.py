@@ -49,17 +49,21 @@ class Face(NamedTuple):
 
     def blocks(self, stiffness: Array) -> Array:
         """Stiffness B' S B (g, 3 k, 3 k) of each group, by stiffnesses S (q, 3, 3) of points."""
-        parts = self.shares.reshape(*stiffness.shape[:2], -1)
+        parts = self.shares.reshape(-1, 3, self.shares.shape[2])
         pushed = (stiffness @ parts).reshape(self.shares.shape)
         return self.shares.swapaxes(1, 2) @ pushed
 
     def load(self, u: Array, drive: Drive) -> Array:
         """Loads (m,), of which the first follows from its displacement where that is prescribed."""
         xp = numbers_of(u)
-        others = self.flexibility[0, 1:] @ drive.load[1:]
         soft = xp.where(drive.driven, self.flexibility[0, 0], 1.0)
-        moved = (drive.load[0] + drive.start - self.loads[:, 0] @ u - others) / soft
-        return put(drive.load, 0, xp.where(drive.driven, moved, drive.load[0]))
+        first = xp.where(drive.driven, self.left(u, drive) / soft, drive.load[0])
+        return put(drive.load, 0, first)
+
+    def left(self, u: Array, drive: Drive) -> Array:
+        """Part of a prescribed displacement that the nodes and the other loads do not make."""
+        others = self.flexibility[0, 1:] @ drive.load[1:]
+        return drive.load[0] + drive.start - self.loads[:, 0] @ u - others
 
 
 class Drive(NamedTuple):
@@ -109,9 +113,7 @@ class Sticking(NamedTuple):
         """Displacements (N,) under a load, and under nodal forces (N,)."""
         xp = numbers_of(force)
         free = self.inverse @ (force + face.loads[:, 1:] @ drive.load[1:])
-        others = face.flexibility[0, 1:] @ drive.load[1:]
-        moved = drive.load[0] + drive.start - others - face.loads[:, 0] @ free
-        load = xp.where(drive.driven, moved / self.soft, drive.load[0])
+        load = xp.where(drive.driven, face.left(free, drive) / self.soft, drive.load[0])
         return free + load * self.pulled
 
     def moved(self, force: Array, driven: Array, pull: Array) -> Array:

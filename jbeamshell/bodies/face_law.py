@@ -73,7 +73,10 @@ def slip_at(move: Array, slip: Array, points: Points) -> Array:
 
 
 def slip_slopes(move: Array, slip: Array, points: Points) -> Array:
-    """Slopes (q, 3, 3) of `slip_at` by v, zero where a smooth point sticks."""
+    """Slopes (q, 3, 3) of `slip_at` by v, zero where a smooth point sticks.
+
+    They are written out because NumPy has no derivatives; a test compares them with JAX's.
+    """
     xp = numbers_of(move)
     depth = -(points.gap + move[:, 2])
     touches, force = depth >= 0.0, _normal_force(depth, points)

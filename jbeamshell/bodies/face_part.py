@@ -62,12 +62,9 @@ def _by_numpy(
 ) -> Any:
     """Force on the nodes; ``away`` is that of the load per displacement, where it is held."""
     groups = np.flatnonzero(slopes.reshape(len(face.shares), -1).any(axis=1))
-    shares: Any = face.shares[groups]
     places: Any = face.places[groups]
-    count = shares.shape[1] // 3
-    slopes = slopes.reshape(-1, count, 3, 3)[groups]
-    parts = shares.reshape(-1, count, 3, shares.shape[2])
-    blocks = shares.swapaxes(1, 2) @ (slopes @ parts).reshape(shares.shape)
+    slopes = slopes.reshape(len(face.shares), -1, 3, 3)[groups].reshape(-1, 3, 3)
+    blocks: Any = face._replace(shares=face.shares[groups]).blocks(slopes)
     changed = right != 0.0
     changed[places[blocks.any(axis=2)]] = True
     beside = np.zeros(right.size, bool)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
@@ -18,12 +19,11 @@ from jbeamshell.bodies.face_path import (
     pressed,
     steps_of,
 )
-from jbeamshell.common.small import Small
 
 
-@Small
+@eqx.filter_jit
 def traced_levels(
-    inputs: tuple[Face, Array], half: int | None, frictional: bool, driven: bool
+    face: Face, loads: Array, half: int | None, frictional: bool, driven: bool
 ) -> tuple[Steps, Array]:
     """Levels of a path, and the number of cycles until it is steady.
 
@@ -32,10 +32,9 @@ def traced_levels(
 
     Parameters
     ----------
-    inputs : face, and loads (levels, m), see `jbeamshell.bodies.face_path.levels_of`
-    half, frictional, driven : as there
+    face : bodies and points
+    loads, half, frictional, driven : as `jbeamshell.bodies.face_path.levels_of` takes them
     """
-    face, loads = inputs
     bodies = face, Sticking.of(lax.stop_gradient(face))
     begin, start = nothing_yet(face), jnp.zeros(())
     if half is None:

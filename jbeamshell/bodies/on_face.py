@@ -37,8 +37,7 @@ def solved(problem: Problem) -> Found:
     if is_traced(problem):
         bodies = bodies_of(problem)
         frictional, driven = problem.assembly == "frictional", problem.control == "displacement"
-        inputs = bodies.face, problem.loads
-        steps, count = traced_levels(inputs, problem.half, frictional, driven)
+        steps, count = traced_levels(bodies.face, problem.loads, problem.half, frictional, driven)
         return Found(_in_levels((bodies, steps)), count)
     return _by_numpy(plain(problem))
 

@@ -68,7 +68,7 @@ def summed(values: Any, places: Any, size: int) -> Any:
 
 
 def cond(holds: Any, one: Callable[[], T], other: Callable[[], T]) -> T:
-    """What the first function gives where a truth holds, else the second; see `jax.lax.cond`."""
+    """Value of one function where a truth holds, else of the other; see `jax.lax.cond`."""
     if numbers_of(holds) is jnp:
         found: T = lax.cond(holds, one, other)
         return found
